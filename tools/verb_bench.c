@@ -153,7 +153,7 @@ static npg_status open_surface(bench *b)
 
 static npg_status closest(bench *b)
 {
-    return npg_surface_closest_near(b->surface, b->hits, b->clouds[1].pos, b->clouds[1].count, NULL, NULL, 0);
+    return npg_surface_closest_near(b->surface, b->hits, b->clouds[1].pos, b->clouds[1].count, NULL, 0);
 }
 
 static npg_status open_tracker(bench *b)

@@ -448,7 +448,7 @@ static npg_status find_on_surface(const step *s, size_t first, size_t last)
 {
     const npg_tracker *t = s->t;
     return npg_surface_closest_near(t->surface, t->hits + first, t->targets + 3 * first, last - first,
-                                    s->is_first ? NULL : t->start_face + first, NULL, 1);
+                                    s->is_first ? NULL : t->start_face + first, 1);
 }
 
 static size_t lent_of(const npg_tracker *t, double share)

@@ -386,12 +386,10 @@ npg_status npg_patch_of_sets(npg_patch *patch, uint32_t *parents, const uint8_t 
 
 /* The closest surface point (closest face: the smallest squared distance as float, ties to the lower face
  * index).  hits[i] for points[i] (N x 3).  start_face (N, or NULL) names a face that is likely near; the
- * search then begins with the distance to it.  start_dist (N, or NULL) is a distance the answer is likely
- * within.  Both only save time: where they are wrong (out of range, too small, not finite) the answer is the
- * same.  A point that is not finite gets face = UINT32_MAX and dist_sq = infinity.  NPG_MEMORY. */
+ * search then begins with the distance to it: it only saves time, where it is wrong (out of range, too) the
+ * answer is the same.  A point that is not finite gets face = UINT32_MAX and dist_sq = infinity.  NPG_MEMORY. */
 npg_status npg_surface_closest_near(const npg_surface *surface, npg_surface_hit *hits, const float *points,
-                                    size_t point_count, const uint32_t *start_face, const float *start_dist,
-                                    int threads);
+                                    size_t point_count, const uint32_t *start_face, int threads);
 
 /* The same of a mesh as it lies, without hints, on all cores. */
 npg_status npg_mesh_closest(npg_surface_hit *hits, const npg_mesh *mesh, const float *points,

@@ -8,13 +8,9 @@
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
-#define LANES       16   /* points of a leaf at most: one wide register of floats */
-#define DEPTH_MAX   32   /* of a tree of 2^32 points                              */
-#define AROUND_MAX  48   /* leaves that the points of one look through */
-#define REACH       1.5f /* how far, in distances of a k-th neighbour                         */
-#define GUESS       1.6f /* squared distance of a k-th neighbour, in that of the point before */
-#define POOL_MAX    128  /* points within that                                                */
-#define QUERIES_MIN 512  /* worth a thread */
+#define LANES       16  /* points of a leaf at most: one wide register of floats */
+#define DEPTH_MAX   32  /* of a tree of 2^32 points                              */
+#define QUERIES_MIN 512 /* worth a thread */
 
 typedef struct leaf { /* lanes without a point are infinitely far away, their index is UINT32_MAX */
     float at[3][LANES];
@@ -27,10 +23,11 @@ typedef struct split { /* along the axis the left half ends at lo, the right one
 } split;
 
 struct npg_kdtree {
+    npg_arena arena;
     const float *points; /* loan */
     size_t count, inner; /* inner node i has the children 2 i + 1 and 2 i + 2; inner + 1 leaves follow */
-    split *splits;       /* inner; owned */
-    leaf *leaves;        /* inner + 1; owned */
+    split *splits;       /* inner */
+    leaf *leaves;        /* inner + 1 */
     float lo[3], hi[3];  /* box of all points */
 };
 
@@ -139,29 +136,27 @@ static void build_all(npg_kdtree *tree, item *items)
 
 npg_status npg_kdtree_open(npg_kdtree **out, const float *points, size_t point_count)
 {
-    npg_kdtree *tree;
-    item *items = NULL;
+    item *items;
     *out = NULL;
     NPG_REQUIRE(points && point_count >= 1 && point_count < UINT32_MAX);
-    NPG_TRY(npg_alloc(&tree, NPG_FOR_QUERY, sizeof *tree));
-    *tree = (npg_kdtree){.points = points, .count = point_count, .inner = inner_for(point_count)};
-    npg_status status = npg_alloc_array(&items, NPG_FOR_QUERY, point_count, sizeof *items);
-    if (!status) status = npg_alloc_array(&tree->splits, NPG_FOR_QUERY, tree->inner, sizeof *tree->splits);
-    if (!status)
-        status = npg_alloc_array(&tree->leaves, NPG_FOR_QUERY, tree->inner + 1, sizeof *tree->leaves);
+    NPG_TRY(npg_object_open(out, NPG_FOR_QUERY, sizeof **out));
+    npg_kdtree *tree = *out;
+    tree->points = points;
+    tree->count = point_count;
+    tree->inner = inner_for(point_count);
+    tree->splits = npg_arena_take(&tree->arena, tree->inner, sizeof *tree->splits);
+    tree->leaves = npg_arena_take(&tree->arena, tree->inner + 1, sizeof *tree->leaves);
+    npg_status status = npg_arena_status(&tree->arena);
+    if (!status) status = npg_alloc_array(&items, NPG_FOR_QUERY, point_count, sizeof *items);
     if (!status) build_all(tree, items);
-    npg_release(&items);
-    if (status) npg_kdtree_close(&tree);
-    *out = tree;
+    if (!status) npg_release(&items);
+    if (status) npg_kdtree_close(out);
     return status;
 }
 
 void npg_kdtree_close(npg_kdtree **slot)
 {
-    if (!slot || !*slot) return;
-    npg_release(&(*slot)->splits);
-    npg_release(&(*slot)->leaves);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 void npg_kdtree_leave_out(npg_kdtree *tree, const uint8_t *keep)
@@ -324,111 +319,7 @@ INLINE void unpack(uint32_t *index, float *dist_sq, const nearest *n)
     }
 }
 
-/* ---- all points: those of a leaf look through the same leaves ---- */
-
-typedef struct around { /* all leaves within reach of a leaf, itself first */
-    const leaf *leaves[AROUND_MAX];
-    size_t count;
-    float reach_sq;
-} around;
-
-INLINE void box_of(float lo[3], float hi[3], const leaf *l)
-{
-    for (int a = 0; a < 3; a++) {
-        lo[a] = INFINITY;
-        hi[a] = -INFINITY;
-        for (int k = 0; k < LANES; k++) {
-            float x = l->at[a][k];
-            lo[a] = x < lo[a] ? x : lo[a];
-            hi[a] = x > hi[a] && x < INFINITY ? x : hi[a];
-        }
-    }
-}
-
-/* False where there are too many. */
-INLINE bool look_around(around *to, const npg_kdtree *tree, const leaf *of, float reach)
-{
-    float lo[3], hi[3];
-    walk w = {.count = 1, .waiting[0] = {0}};
-    box_of(lo, hi, of);
-    *to = (around){.leaves[0] = of, .count = 1, .reach_sq = reach * reach};
-    while (w.count) {
-        branch at = w.waiting[--w.count];
-        if (at.node >= tree->inner) {
-            const leaf *l = &tree->leaves[at.node - tree->inner];
-            if (l == of) continue;
-            if (to->count == AROUND_MAX) return false;
-            to->leaves[to->count++] = l;
-            continue;
-        }
-        const split *s = &tree->splits[at.node];
-        float before = lo[s->axis] - s->lo, behind = s->hi - hi[s->axis];
-        for (int side = 0; side < 2; side++) {
-            float off = side ? behind : before;
-            branch *next = &w.waiting[w.count];
-            *next = at;
-            next->x = s->axis == 0 && off > at.x ? off : at.x;
-            next->y = s->axis == 1 && off > at.y ? off : at.y;
-            next->z = s->axis == 2 && off > at.z ? off : at.z;
-            next->node = 2 * at.node + 1 + (size_t)side;
-            w.count += sum_of_squares(next->x, next->y, next->z) <= to->reach_sq;
-        }
-    }
-    return true;
-}
-
-/* Points within some distance, not in order. */
-typedef struct pool {
-    int64_t keys[POOL_MAX]; /* as those of nearest; signed, which processors compare at once */
-    size_t count;
-} pool;
-
-/* False where there are more than fit. */
-INLINE bool fill_pool(pool *p, const around *from, const float q[3], float worst)
-{
-    float dist_sq[LANES];
-    p->count = 0;
-    for (size_t i = 0; i < from->count; i++) {
-        const leaf *l = from->leaves[i];
-        unsigned near = near_lanes(dist_sq, l, q, worst);
-        if (p->count + LANES > POOL_MAX) return false;
-        for (; near; near &= near - 1) {
-            int lane = __builtin_ctz(near);
-            p->keys[p->count++] = (int64_t)key_of(dist_sq[lane], l->index[lane]);
-        }
-    }
-    return true;
-}
-
-/* The place of each key is the number of those below it: more comparisons than sorting takes, but no branch
- * that a processor could guess wrong. */
-INLINE void sort_pool(int64_t *sorted, pool *p)
-{
-    size_t padded = (p->count + 7) / 8 * 8;
-    for (size_t i = p->count; i < padded; i++) p->keys[i] = INT64_MAX;
-    for (size_t i = 0; i < p->count; i++) {
-        int64_t below[8] = {0}, key = p->keys[i];
-        for (size_t j = 0; j < padded; j += 8)
-            for (size_t lane = 0; lane < 8; lane++) below[lane] += p->keys[j + lane] < key;
-        for (size_t lane = 1; lane < 8; lane++) below[0] += below[lane];
-        sorted[below[0]] = key;
-    }
-}
-
-/* The k nearest of q as find_nearest() finds them, from leaves that were found for all of its leaf; false
- * where they may not all be there. */
-INLINE bool find_around(nearest *n, const around *from, const float q[3])
-{
-    pool p;
-    int64_t sorted[POOL_MAX];
-    float guess = GUESS * dist_of(n->keys[n->k - 1]);
-    if (!(guess <= from->reach_sq) || isinf(guess) || !fill_pool(&p, from, q, guess) || p.count < n->k)
-        return false;
-    sort_pool(sorted, &p);
-    memcpy(n->keys, sorted, n->k * sizeof *n->keys);
-    memcpy(n->last, q, sizeof n->last);
-    return true;
-}
+/* ---- all points, leaf by leaf: the next one is near ---- */
 
 typedef struct each {
     const npg_kdtree *tree;
@@ -438,38 +329,21 @@ typedef struct each {
     void *user;
 } each;
 
-typedef struct visitor {
+NPG_WIDE static void visit_leaves(const each *e, size_t first, size_t end)
+{
     uint64_t keys[NPG_KDTREE_NEIGHBOURS];
     uint32_t index[NPG_KDTREE_NEIGHBOURS];
     float dist_sq[NPG_KDTREE_NEIGHBOURS];
-    nearest n;
-    around near;
-    bool has_last;
-} visitor;
-
-INLINE void visit_leaf(visitor *v, const each *e, const leaf *l)
-{
-    bool is_around = false, is_first = true;
-    for (int lane = 0; lane < LANES; lane++) {
-        uint32_t point = l->index[lane];
+    nearest n = {.k = e->k, .keys = keys};
+    bool has_last = false;
+    for (size_t i = first * LANES; i < end * LANES; i++) {
+        uint32_t point = e->tree->leaves[i / LANES].index[i % LANES];
         if (point == UINT32_MAX || (e->only && !e->only[point])) continue;
-        const float *q = e->tree->points + 3 * (size_t)point;
-        if (!is_around || !find_around(&v->n, &v->near, q)) find_nearest(&v->n, e->tree, q, v->has_last);
-        if (is_first)
-            is_around = look_around(&v->near, e->tree, l, REACH * sqrtf(dist_of(v->keys[e->k - 1])));
-        is_first = false;
-        v->has_last = true;
-        unpack(v->index, v->dist_sq, &v->n);
-        e->visit(e->user, point, v->index, v->dist_sq);
+        find_nearest(&n, e->tree, e->tree->points + 3 * (size_t)point, has_last);
+        has_last = true;
+        unpack(index, dist_sq, &n);
+        e->visit(e->user, point, index, dist_sq);
     }
-}
-
-NPG_WIDE static void visit_leaves(const each *e, size_t first, size_t end)
-{
-    visitor v;
-    v.n = (nearest){.k = e->k, .keys = v.keys};
-    v.has_last = false;
-    for (size_t l = first; l < end; l++) visit_leaf(&v, e, &e->tree->leaves[l]);
 }
 
 static npg_status visit_share(void *user, size_t part)

@@ -141,32 +141,28 @@ void npg_surface_close(npg_surface **slot)
 
 /* ---- a batch over several threads ---- */
 
-typedef struct job {
-    void (*body)(const struct job *job, size_t first, size_t last);
+typedef struct batch {
+    void (*one)(const struct batch *batch, size_t i);
     const npg_surface *surface;
-    const float *points, *start_dist;
+    const float *points;
     const uint32_t *start_face;
     npg_surface_hit *hits;
     const npg_ray *rays;
     npg_ray_hit *ray_hits;
-} job;
-
-typedef struct split {
-    const job *job;
     size_t count, parts;
-} split;
+} batch;
 
 static npg_status run_part(void *user, size_t part)
 {
-    const split *s = user;
-    s->job->body(s->job, s->count * part / s->parts, s->count * (part + 1) / s->parts);
+    const batch *b = user;
+    for (size_t i = b->count * part / b->parts; i < b->count * (part + 1) / b->parts; i++) b->one(b, i);
     return NPG_OK;
 }
 
-static npg_status run_job(const job *j, size_t count, int threads)
+static npg_status run_batch(batch b, int threads)
 {
-    split s = {j, count, npg_parallel_parts(count, BATCH_MIN, threads > 0 ? (size_t)threads : 0)};
-    return npg_parallel(run_part, &s, s.parts);
+    b.parts = npg_parallel_parts(b.count, BATCH_MIN, threads > 0 ? (size_t)threads : 0);
+    return npg_parallel(run_part, &b, b.parts);
 }
 
 /* ---- closest points ---- */
@@ -232,49 +228,35 @@ static void run_search(search *s, float radius)
     rtcPointQuery(s->surface->scene, &query, &context, on_face, s);
 }
 
-static void closest_of(const job *j, size_t i)
+static void closest_of(const batch *b, size_t i)
 {
-    search s = {j->surface, j->points + 3 * i, {UINT32_MAX, {0, 0, 0}, INFINITY}};
-    npg_surface_hit *hit = &j->hits[i];
+    search s = {b->surface, b->points + 3 * i, {UINT32_MAX, {0, 0, 0}, INFINITY}};
     float radius = INFINITY;
-    if (!npg_vec3_is_finitef(s.point)) {
-        *hit = s.best;
-        return;
-    }
-    if (j->start_face && j->start_face[i] < j->surface->face_count) {
-        try_face(&s, j->start_face[i]);
+    if (b->start_face && b->start_face[i] < b->surface->face_count && npg_vec3_is_finitef(s.point)) {
+        try_face(&s, b->start_face[i]);
         radius = radius_of(&s);
     }
-    if (j->start_dist && j->start_dist[i] >= 0 && j->start_dist[i] < radius) radius = j->start_dist[i];
-    run_search(&s, radius);
-    /* Nothing within the start distance: it was too small. */
-    if (isfinite(radius) && !(s.best.dist_sq <= radius * radius)) run_search(&s, INFINITY);
-    *hit = s.best;
-}
-
-static void closest_part(const job *j, size_t first, size_t last)
-{
-    for (size_t i = first; i < last; i++) closest_of(j, i);
+    if (npg_vec3_is_finitef(s.point)) run_search(&s, radius);
+    b->hits[i] = s.best;
 }
 
 npg_status npg_surface_closest_near(const npg_surface *surface, npg_surface_hit *hits, const float *points,
-                                    size_t point_count, const uint32_t *start_face, const float *start_dist,
-                                    int threads)
+                                    size_t point_count, const uint32_t *start_face, int threads)
 {
     NPG_REQUIRE(surface && ((hits && points) || !point_count));
-    job j = {.body = closest_part,
-             .surface = surface,
-             .points = points,
-             .start_dist = start_dist,
-             .start_face = start_face,
-             .hits = hits};
-    return run_job(&j, point_count, threads);
+    return run_batch((batch){.one = closest_of,
+                             .surface = surface,
+                             .points = points,
+                             .start_face = start_face,
+                             .hits = hits,
+                             .count = point_count},
+                     threads);
 }
 
 npg_status npg_surface_closest(const npg_surface *surface, npg_surface_hit *hits, const float *points,
                                size_t point_count)
 {
-    return npg_surface_closest_near(surface, hits, points, point_count, NULL, NULL, 1);
+    return npg_surface_closest_near(surface, hits, points, point_count, NULL, 1);
 }
 
 npg_status npg_mesh_closest(npg_surface_hit *hits, const npg_mesh *mesh, const float *points,
@@ -282,14 +264,14 @@ npg_status npg_mesh_closest(npg_surface_hit *hits, const npg_mesh *mesh, const f
 {
     npg_surface *surface;
     NPG_TRY(npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
-    npg_status status = npg_surface_closest_near(surface, hits, points, point_count, NULL, NULL, 0);
+    npg_status status = npg_surface_closest_near(surface, hits, points, point_count, NULL, 0);
     npg_surface_close(&surface);
     return status;
 }
 
 /* ---- rays ---- */
 
-static void cast_ray(const job *j, size_t i)
+static void cast_ray(const batch *j, size_t i)
 {
     const npg_ray *ray = &j->rays[i];
     struct RTCIntersectContext context;
@@ -317,15 +299,11 @@ static void cast_ray(const job *j, size_t i)
         cast.hit.primID, {1 - cast.hit.u - cast.hit.v, cast.hit.u, cast.hit.v}, cast.ray.tfar, facing > 0};
 }
 
-static void ray_part(const job *j, size_t first, size_t last)
-{
-    for (size_t i = first; i < last; i++) cast_ray(j, i);
-}
-
 npg_status npg_surface_rays(const npg_surface *surface, npg_ray_hit *hits, const npg_ray *rays,
                             size_t ray_count, int threads)
 {
     NPG_REQUIRE(surface && ((hits && rays) || !ray_count));
-    job j = {.body = ray_part, .surface = surface, .rays = rays, .ray_hits = hits};
-    return run_job(&j, ray_count, threads);
+    return run_batch(
+        (batch){.one = cast_ray, .surface = surface, .rays = rays, .ray_hits = hits, .count = ray_count},
+        threads);
 }

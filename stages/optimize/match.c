@@ -37,7 +37,7 @@ static npg_status look(npg_point_matcher *m, size_t *count, const npg_energy_fra
     *count = npg_points_spread(m->targets, m->target_normals, m->most, frame->points, frame->normals,
                                frame->point_count);
     NPG_TRY(npg_surface_move(m->surface, frame->positions));
-    return npg_surface_closest_near(m->surface, m->hits, m->targets, *count, NULL, NULL, 1);
+    return npg_surface_closest_near(m->surface, m->hits, m->targets, *count, NULL, 1);
 }
 
 npg_status npg_point_matcher_measure(npg_point_matcher *m, double *spread, const npg_energy_frame *frame)

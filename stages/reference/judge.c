@@ -41,8 +41,7 @@ static npg_status points_off(double *mean, const judging *j, const npg_candidate
     npg_surface_hit *hits = npg_arena_take(&scratch, cloud->held_count, sizeof *hits);
     npg_status status = npg_arena_status(&scratch);
     double sum = 0;
-    if (!status)
-        status = npg_surface_closest_near(j->surface, hits, cloud->held, cloud->held_count, NULL, NULL, 1);
+    if (!status) status = npg_surface_closest_near(j->surface, hits, cloud->held, cloud->held_count, NULL, 1);
     for (size_t i = 0; i < cloud->held_count && !status; i++) sum += rho(j, (double)hits[i].dist_sq);
     *mean = cloud->held_count ? sum / (double)cloud->held_count : 0;
     npg_arena_release(&scratch);

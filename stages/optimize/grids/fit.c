@@ -29,7 +29,8 @@ struct npg_fit {
     npg_sobolev sobolev;
     npg_buffer u, nodes, dnodes; /* differential coordinates, features, gradient: [nodes][32] */
     npg_adam grid_adam, mlp_adam;
-    float *params; /* decoder's parameters between windows */
+    float *params;             /* decoder's parameters between windows */
+    struct npg_fit_copy first; /* owned */
     uint64_t seed;
     npg_arena window; /* holds the arrays of the window */
     npg_mlp mlp;
@@ -209,6 +210,7 @@ void npg_fit_close(npg_fit **slot)
     npg_buffer_close(&fit->nodes);
     npg_buffer_close(&fit->dnodes);
     npg_release(&fit->edges);
+    npg_release(&fit->first.bytes);
     npg_arena_release(&fit->arrays);
     npg_release(slot);
 }
@@ -559,7 +561,8 @@ npg_fit_parts npg_fit_open_parts(npg_fit *fit)
 {
     npg_mlp_shape shape = shape_of(&fit->settings.grid);
     return (npg_fit_parts){&fit->levels,   &fit->u,     &fit->grid_adam,
-                           &fit->mlp_adam, fit->params, npg_mlp_param_count(&shape)};
+                           &fit->mlp_adam, fit->params, npg_mlp_param_count(&shape),
+                           &fit->first};
 }
 
 #define UNITS 2 /* of the device, whose scratch memory counts: on more the drivers' own counts more */

@@ -73,13 +73,20 @@ npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *
 /* Positions or ways (V x 3, in the order of the reference) of the i-th frame of the last window. */
 npg_status npg_fit_vertices(npg_fit *fit, float *vert_unit, size_t i);
 
-/* What goes from window to window, for saving and restoring: loans of the fit's own. */
+/* Device and host bytes that a window of `frames` frames of at most `points` points takes. */
+size_t npg_fit_memory(const npg_fit_settings *settings, size_t vert_count, size_t frames, size_t points);
+
+/* What a fit knows (grids, decoder and their optimisers) goes from window to window; loans of the fit's own. */
 typedef struct npg_fit_parts {
     const struct npg_levels *levels;
     npg_buffer *u; /* [row_count][32] */
     struct npg_adam *grid_adam, *mlp_adam;
     float *params; /* of the decoder after the last run */
     size_t param_count;
+    struct npg_fit_copy {
+        char *bytes; /* all parts one behind the other; NULL: none */
+        size_t size;
+    } * first; /* after the window around the keyframe */
 } npg_fit_parts;
 
 npg_fit_parts npg_fit_open_parts(npg_fit *fit);
@@ -89,35 +96,19 @@ npg_fit_parts npg_fit_open_parts(npg_fit *fit);
 npg_status npg_fit_read_params(npg_fit *fit);
 npg_status npg_fit_write_params(npg_fit *fit);
 
-/* Device and host bytes that a window of `frames` frames of at most `points` points takes. */
-size_t npg_fit_memory(const npg_fit_settings *settings, size_t vert_count, size_t frames, size_t points);
-
-/* Copy: what a fit knows (grids, decoder and their optimisers) on the host: to start a window from another than
- * the one before it. */
-
-/* {0} is none yet. */
-typedef struct npg_fit_copy {
-    char *bytes; /* all parts one behind the other, owned; NULL: none */
-    size_t size;
-} npg_fit_copy;
-
-/* The present state, between steps. */
-npg_status npg_fit_copy_take(npg_fit_copy *copy, npg_fit *fit);
-npg_status npg_fit_copy_give(const npg_fit_copy *copy, npg_fit *fit);
-void npg_fit_copy_clear(npg_fit_copy *copy);
+/* Before a window: where it borders on that around the keyframe, the fit is what it was after that one.  After
+ * one: that around the keyframe is remembered. */
+npg_status npg_fit_recall(npg_fit *fit, const npg_window *window);
+npg_status npg_fit_remember(npg_fit *fit, const npg_window *window);
 
 /* Grids and decoder from one fit to another, whose optimiser stays its own: the moments of another loss would
  * shorten or lengthen its steps for hundreds of epochs. */
 npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from);
 
-/* As a block of a store; loading a block that is missing leaves none. */
-npg_status npg_fit_copy_save(const npg_fit_copy *copy, npg_store *store, const char *block);
-npg_status npg_fit_copy_load(npg_fit_copy *copy, const npg_record *store, const char *block);
-
-/* The present state of a fit as a block, and back into one of the same settings and reference: NPG_BAD_INPUT
- * where the block is missing or has another size. */
-npg_status npg_fit_save(npg_fit *fit, npg_store *store, const char *block);
-npg_status npg_fit_restore(npg_fit *fit, const npg_record *record, const char *block);
+/* The present state and, where it is still needed, that after the first window as blocks of a store, and back
+ * into a fit of the same settings and reference: NPG_BAD_INPUT where a block has another size. */
+npg_status npg_fit_save(npg_fit *fit, npg_store *store, bool with_first);
+npg_status npg_fit_restore(npg_fit *fit, const npg_record *record);
 
 /* Which latent grids a fit has, from its settings (paper, latent grids); all zero before. */
 void npg_fit_levels(npg_levels *levels, const npg_grid_settings *settings);
@@ -154,9 +145,8 @@ double npg_weights_next(npg_weights *weights, int64_t index, double cd, bool has
  * so that frames which two windows share mean the same to both.  That window goes from 0 to span. */
 double npg_grids_time(const npg_plan *plan, double span, int64_t index);
 
-/* A fit and what it knew after the window around the keyframe, to a state and back, with the latent grids
- * (VDB) beside it. */
-npg_status npg_grids_save(npg_fit *fit, const npg_fit_copy *first, const npg_facts *facts, npg_store *store,
+/* A fit to a state, with the latent grids (VDB) beside it. */
+npg_status npg_grids_save(npg_fit *fit, const npg_facts *facts, npg_store *store,
                           const npg_solver_moment *moment);
 
 #endif

@@ -37,14 +37,14 @@ static size_t size_of(const part *parts, size_t count)
     return size;
 }
 
-npg_status npg_fit_copy_take(npg_fit_copy *copy, npg_fit *fit)
+static npg_status take(struct npg_fit_copy *copy, npg_fit *fit)
 {
     part parts[PARTS_MAX];
-    size_t count = parts_of(parts, fit), size = size_of(parts, count), at = 0;
+    size_t count = parts_of(parts, fit), at = 0;
     NPG_TRY(npg_fit_read_params(fit));
-    if (copy->size != size) npg_fit_copy_clear(copy);
-    if (!copy->bytes) NPG_TRY(npg_alloc(&copy->bytes, NPG_FOR_FIT, size));
-    copy->size = size;
+    copy->size = size_of(parts, count);
+    npg_release(&copy->bytes);
+    NPG_TRY(npg_alloc(&copy->bytes, NPG_FOR_FIT, copy->size));
     for (size_t i = 0; i < count; at += parts[i++].size) {
         if (parts[i].buffer) NPG_TRY(npg_buffer_read(parts[i].buffer, 0, copy->bytes + at, parts[i].size));
         if (parts[i].host && parts[i].size) memcpy(copy->bytes + at, parts[i].host, parts[i].size);
@@ -52,23 +52,28 @@ npg_status npg_fit_copy_take(npg_fit_copy *copy, npg_fit *fit)
     return NPG_OK;
 }
 
-npg_status npg_fit_copy_give(const npg_fit_copy *copy, npg_fit *fit)
+static npg_status give(npg_fit *fit, const char *bytes, size_t size)
 {
     part parts[PARTS_MAX];
     size_t count = parts_of(parts, fit), at = 0;
-    if (copy->size != size_of(parts, count))
+    if (!bytes || size != size_of(parts, count))
         return npg_error(NPG_BAD_INPUT, "the state of a fit has another size than this fit's");
     for (size_t i = 0; i < count; at += parts[i++].size) {
-        if (parts[i].buffer) NPG_TRY(npg_buffer_write(parts[i].buffer, 0, copy->bytes + at, parts[i].size));
-        if (parts[i].host && parts[i].size) memcpy(parts[i].host, copy->bytes + at, parts[i].size);
+        if (parts[i].buffer) NPG_TRY(npg_buffer_write(parts[i].buffer, 0, bytes + at, parts[i].size));
+        if (parts[i].host && parts[i].size) memcpy(parts[i].host, bytes + at, parts[i].size);
     }
     return npg_fit_write_params(fit);
 }
 
-void npg_fit_copy_clear(npg_fit_copy *copy)
+npg_status npg_fit_recall(npg_fit *fit, const npg_window *window)
 {
-    npg_release(&copy->bytes);
-    copy->size = 0;
+    const struct npg_fit_copy *first = npg_fit_open_parts(fit).first;
+    return window->from == 0 && first->bytes ? give(fit, first->bytes, first->size) : NPG_OK;
+}
+
+npg_status npg_fit_remember(npg_fit *fit, const npg_window *window)
+{
+    return window->direction ? NPG_OK : take(npg_fit_open_parts(fit).first, fit);
 }
 
 npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from)
@@ -85,36 +90,25 @@ npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from)
     return status ? status : npg_fit_write_params(to);
 }
 
-npg_status npg_fit_copy_save(const npg_fit_copy *copy, npg_store *store, const char *block)
+npg_status npg_fit_save(npg_fit *fit, npg_store *store, bool with_first)
 {
-    return copy->bytes ? npg_store_put(store, block, copy->bytes, copy->size) : NPG_OK;
-}
-
-npg_status npg_fit_copy_load(npg_fit_copy *copy, const npg_record *record, const char *block)
-{
-    npg_fit_copy_clear(copy);
-    if (!npg_record_find(record, block, &copy->size)) {
-        copy->size = 0;
-        return NPG_OK;
-    }
-    NPG_TRY(npg_alloc(&copy->bytes, NPG_FOR_FIT, copy->size));
-    return npg_record_get(record, block, copy->bytes, copy->size);
-}
-
-npg_status npg_fit_save(npg_fit *fit, npg_store *store, const char *block)
-{
-    npg_fit_copy copy = {0};
-    npg_status status = npg_fit_copy_take(&copy, fit);
-    if (!status) status = npg_fit_copy_save(&copy, store, block);
-    npg_fit_copy_clear(&copy);
+    const struct npg_fit_copy *first = npg_fit_open_parts(fit).first;
+    struct npg_fit_copy now = {0};
+    if (with_first && first->bytes) NPG_TRY(npg_store_put(store, "first", first->bytes, first->size));
+    npg_status status = take(&now, fit);
+    if (!status) status = npg_store_put(store, "fit", now.bytes, now.size);
+    npg_release(&now.bytes);
     return status;
 }
 
-npg_status npg_fit_restore(npg_fit *fit, const npg_record *record, const char *block)
+npg_status npg_fit_restore(npg_fit *fit, const npg_record *record)
 {
-    npg_fit_copy copy = {0};
-    npg_status status = npg_fit_copy_load(&copy, record, block);
-    if (!status) status = npg_fit_copy_give(&copy, fit);
-    npg_fit_copy_clear(&copy);
-    return npg_error_prefix(status, "the block %s", block);
+    struct npg_fit_copy *first = npg_fit_open_parts(fit).first;
+    size_t size;
+    const char *now = npg_record_find(record, "fit", &size);
+    NPG_TRY(npg_error_prefix(give(fit, now, size), "the block fit"));
+    if (!npg_record_find(record, "first", &first->size)) return NPG_OK;
+    npg_release(&first->bytes);
+    NPG_TRY(npg_alloc(&first->bytes, NPG_FOR_FIT, first->size));
+    return npg_record_get(record, "first", first->bytes, first->size);
 }

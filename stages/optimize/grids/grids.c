@@ -28,7 +28,6 @@ typedef struct grids {
     size_t vert_count;     /* W                                */
     npg_carrier *carriers; /* W, owned                         */
     npg_fit *fit;          /* over the samples                 */
-    npg_fit_copy first;    /* after window 0                   */
     /* of the window at work */
     npg_energy_system *system; /* loan                                           */
     double at_start, least;    /* E(s), and the least so far                     */
@@ -49,7 +48,6 @@ static void grids_close(void **slot)
     grids *g = *slot;
     npg_arena_release(&g->window);
     npg_fit_close(&g->fit);
-    npg_fit_copy_clear(&g->first);
     npg_proxy_close(&g->samples);
     npg_release(&g->carriers);
     npg_release(slot);
@@ -158,8 +156,7 @@ static npg_status begin(grids *g, const npg_problem *problem)
 {
     npg_fit_frame *frames;
     size_t s = 3 * g->samples->mesh->vert_count;
-    const npg_window *window = problem->window;
-    if (window->from == 0 && g->first.bytes) NPG_TRY(npg_fit_copy_give(&g->first, g->fit));
+    NPG_TRY(npg_fit_recall(g->fit, problem->window));
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, problem->count, sizeof *frames));
     for (size_t t = 0; t < problem->count; t++)
         frames[t] = (npg_fit_frame){
@@ -199,7 +196,7 @@ static npg_status grids_solve(void *solver, npg_solved *solved, const npg_proble
     npg_status status = take_window(g, problem);
     if (!status) status = begin(g, problem);
     if (!status) status = npg_fit_run(g->fit, 0, g->epochs, watch_epoch, g);
-    if (!status && !problem->window->direction) status = npg_fit_copy_take(&g->first, g->fit);
+    if (!status) status = npg_fit_remember(g->fit, problem->window);
     *solved = (npg_solved){.steps = g->epochs, .energy = g->at_start > 0 ? g->least / g->at_start : 1};
     npg_arena_release(&g->window);
     return status;
@@ -251,25 +248,23 @@ static npg_status put_latents(npg_fit *fit, const npg_facts *facts, npg_store *s
     return status;
 }
 
-npg_status npg_grids_save(npg_fit *fit, const npg_fit_copy *first, const npg_facts *facts, npg_store *store,
+npg_status npg_grids_save(npg_fit *fit, const npg_facts *facts, npg_store *store,
                           const npg_solver_moment *moment)
 {
-    if (moment->is_first_needed) NPG_TRY(npg_fit_copy_save(first, store, "first"));
     if (!moment->is_inside) NPG_TRY(put_latents(fit, facts, store, moment));
-    return npg_fit_save(fit, store, "fit");
+    return npg_fit_save(fit, store, moment->is_first_needed);
 }
 
 static npg_status grids_save(void *solver, npg_store *store, const npg_solver_moment *moment)
 {
     grids *g = solver;
-    return npg_grids_save(g->fit, &g->first, g->facts, store, moment);
+    return npg_grids_save(g->fit, g->facts, store, moment);
 }
 
 static npg_status grids_restore(void *solver, const npg_record *record)
 {
     grids *g = solver;
-    NPG_TRY(npg_fit_copy_load(&g->first, record, "first"));
-    return npg_fit_restore(g->fit, record, "fit");
+    return npg_fit_restore(g->fit, record);
 }
 
 const npg_solver npg_solver_grids = {

@@ -31,9 +31,8 @@ typedef struct paper {
     uint64_t seed;
     bool is_alone; /* one window over all frames */
     npg_fit *fit;  /* over all vertices */
-    npg_fit_copy first;
-    progress at; /* of the window at work, or that a resumed run goes on from inside its own */
-    float *best; /* T x V x 3: where that state had the frames, owned                         */
+    progress at;   /* of the window at work, or that a resumed run goes on from inside its own */
+    float *best;   /* T x V x 3: where that state had the frames, owned                         */
     size_t best_size;
     /* of the window at work */
     const npg_problem *problem; /* loan */
@@ -47,7 +46,6 @@ static void paper_close(void **slot)
 {
     paper *p = *slot;
     npg_fit_close(&p->fit);
-    npg_fit_copy_clear(&p->first);
     npg_release(&p->best);
     npg_release(slot);
 }
@@ -211,7 +209,7 @@ static npg_status solve(paper *p)
     bool is_warm = p->problem->window->direction != 0;
     p->steps = p->settings.epochs;
     if (is_warm && !p->at.next) {
-        if (p->problem->window->from == 0 && p->first.bytes) NPG_TRY(npg_fit_copy_give(&p->first, p->fit));
+        NPG_TRY(npg_fit_recall(p->fit, p->problem->window));
         NPG_TRY(open_new(p));
     }
     if (!p->is_alone)
@@ -238,7 +236,7 @@ static npg_status paper_solve(void *solver, npg_solved *solved, const npg_proble
     memcpy(problem->result, p->best, p->best_size);
     *solved = p->at.least;
     p->at = (progress){0};
-    return problem->window->direction ? NPG_OK : npg_fit_copy_take(&p->first, p->fit);
+    return npg_fit_remember(p->fit, problem->window);
 }
 
 static size_t paper_memory(const npg_solver_settings *settings, size_t verts, size_t frames, size_t points)
@@ -259,15 +257,14 @@ static npg_status paper_save(void *solver, npg_store *store, const npg_solver_mo
         NPG_TRY(npg_store_put(store, "inside", &p->at, sizeof p->at));
         NPG_TRY(npg_store_put(store, "inside.best", p->best, p->best_size));
     }
-    return npg_grids_save(p->fit, &p->first, p->facts, store, moment);
+    return npg_grids_save(p->fit, p->facts, store, moment);
 }
 
 static npg_status paper_restore(void *solver, const npg_record *record)
 {
     paper *p = solver;
     size_t size;
-    NPG_TRY(npg_fit_copy_load(&p->first, record, "first"));
-    NPG_TRY(npg_fit_restore(p->fit, record, "fit"));
+    NPG_TRY(npg_fit_restore(p->fit, record));
     if (!npg_record_find(record, "inside", &size)) return NPG_OK;
     NPG_TRY(npg_record_get(record, "inside", &p->at, sizeof p->at));
     npg_record_find(record, "inside.best", &p->best_size);
