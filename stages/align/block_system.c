@@ -38,9 +38,7 @@ struct npg_block_system {
 
 void npg_block_close(npg_block_system **slot)
 {
-    if (!slot || !*slot) return;
-    npg_arena_release(&(*slot)->arena);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 static npg_status open_arrays(npg_block_system *s)
@@ -89,16 +87,14 @@ static void fill_rows(npg_block_system *s, const uint32_t (*pairs)[2])
 
 npg_status npg_block_open(npg_block_system **out, size_t n, const uint32_t (*pairs)[2], size_t pair_count)
 {
-    npg_block_system *s;
     *out = NULL;
-    NPG_TRY(npg_alloc(&s, NPG_FOR_FIT, sizeof *s));
-    s->arena.purpose = NPG_FOR_FIT;
+    NPG_TRY(npg_object_open(out, NPG_FOR_FIT, sizeof **out));
+    npg_block_system *s = *out;
     s->n = n;
     s->pair_count = pair_count;
     npg_status status = open_arrays(s);
     if (!status) fill_rows(s, pairs);
-    if (status) npg_block_close(&s);
-    *out = s;
+    if (status) npg_block_close(out);
     return status;
 }
 

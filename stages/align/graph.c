@@ -197,9 +197,8 @@ static npg_status connect_nodes(npg_graph *graph, npg_arena *scratch)
 /* A graph for so many vertices, which nothing carries yet. */
 static npg_status open_graph(npg_graph **graph, size_t vert_count)
 {
-    NPG_TRY(npg_alloc(graph, NPG_FOR_MESH, sizeof **graph));
+    NPG_TRY(npg_object_open(graph, NPG_FOR_MESH, sizeof **graph));
     npg_graph *g = *graph;
-    g->arena.purpose = NPG_FOR_MESH;
     g->vert_count = vert_count;
     g->vert_node = npg_arena_take(&g->arena, vert_count, NPG_GRAPH_BIND * sizeof *g->vert_node);
     g->vert_weight = npg_arena_take(&g->arena, vert_count, NPG_GRAPH_BIND * sizeof *g->vert_weight);
@@ -257,9 +256,7 @@ npg_status npg_graph_take(npg_graph **out, const npg_graph *whole, const uint32_
 
 void npg_graph_close(npg_graph **slot)
 {
-    if (!slot || !*slot) return;
-    npg_arena_release(&(*slot)->arena);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 /* ---- poses ---- */

@@ -93,32 +93,29 @@ size_t npg_cell_table_memory(size_t most)
 /* ---- a set of cubes ---- */
 
 struct npg_cube_set {
-    double side;
     npg_cell_table table;
+    double side;
 };
 
 static const float any_side[3] = {0, 0, 0};
 
 npg_status npg_cube_set_open(npg_cube_set **out, const float *middles, size_t count, double side)
 {
-    npg_cube_set *s;
     *out = NULL;
     NPG_REQUIRE(side > 0);
-    NPG_TRY(npg_alloc(&s, NPG_FOR_MESH, sizeof *s));
+    NPG_TRY(npg_object_open(out, NPG_FOR_MESH, sizeof **out));
+    npg_cube_set *s = *out;
     s->side = side;
     npg_status status = npg_cell_table_open(&s->table, count);
     for (size_t i = 0; i < count && !status; i++)
         npg_cell_add(&s->table, npg_cell_key(middles + 3 * i, any_side, side));
-    if (status) npg_cube_set_close(&s);
-    *out = s;
+    if (status) npg_cube_set_close(out);
     return status;
 }
 
 void npg_cube_set_close(npg_cube_set **set)
 {
-    if (!set || !*set) return;
-    npg_cell_table_close(&(*set)->table);
-    npg_release(set);
+    npg_object_close(set);
 }
 
 double npg_cube_set_side(const npg_cube_set *set)

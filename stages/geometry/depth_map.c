@@ -12,28 +12,16 @@
 #define OUTLINE     2     /* bins beside a point that still may be the body's */
 
 struct npg_depth_map {
+    npg_arena arena;
     float sensor[3];
     double axes[3][3]; /* the third looks at the points' middle */
     int bins;          /* along a side */
     double margin;
-    npg_arena arena;
     float *near;      /* bins x bins: distance, infinity where there is none                 */
     uint8_t *outside; /* bins x bins: reached from behind without crossing the outline        */
 };
 
 /* ---- directions ---- */
-
-/* axes[0], axes[1]: any two across axes[2]. */
-static void set_axes(double axes[3][3])
-{
-    int least = 0;
-    for (int a = 1; a < 3; a++)
-        if (fabs(axes[2][a]) < fabs(axes[2][least])) least = a;
-    const double up[3] = {least == 0, least == 1, least == 2};
-    npg_vec3_cross(axes[0], up, axes[2]);
-    npg_vec3_make_unit(axes[0]);
-    npg_vec3_cross(axes[1], axes[2], axes[0]);
-}
 
 /* The bin of a place, and its distance; false at the sensor. */
 static bool find_bin(const npg_depth_map *m, int at[2], double *dist, const float place[3])
@@ -88,7 +76,7 @@ static void aim(npg_depth_map *m, double *mean_dist, const float *points, size_t
     }
     memcpy(m->axes[2], middle, sizeof middle);
     if (!npg_vec3_make_unit(m->axes[2])) m->axes[2][2] = 1;
-    set_axes(m->axes);
+    npg_vec3_span_plane(m->axes[0], m->axes[1], m->axes[2]);
     *mean_dist = n ? sum / (double)n : 0;
 }
 
@@ -137,33 +125,29 @@ static npg_status find_outside(npg_depth_map *m)
 npg_status npg_depth_map_open(npg_depth_map **out, const float sensor[3], const float *points, size_t n,
                               double side, double margin)
 {
-    npg_depth_map *m;
     double mean_dist;
     *out = NULL;
     NPG_REQUIRE(side > 0 && margin >= 0);
-    NPG_TRY(npg_alloc(&m, NPG_FOR_MESH, sizeof *m));
+    NPG_TRY(npg_object_open(out, NPG_FOR_MESH, sizeof **out));
+    npg_depth_map *m = *out;
     memcpy(m->sensor, sensor, sizeof m->sensor);
     m->margin = margin;
     aim(m, &mean_dist, points, n);
     m->bins = (int)fmin(BINS_MOST, fmax(BINS_LEAST, ceil(SPHERE_SIDE * mean_dist / side)));
     size_t count = (size_t)m->bins * (size_t)m->bins;
-    m->arena.purpose = NPG_FOR_MESH;
     m->near = npg_arena_take(&m->arena, count, sizeof *m->near);
     m->outside = npg_arena_take(&m->arena, count, sizeof *m->outside);
     npg_status status = npg_arena_status(&m->arena);
     for (size_t i = 0; i < count && !status; i++) m->near[i] = INFINITY;
     if (!status) add_points(m, points, n);
     if (!status && n) status = find_outside(m);
-    if (status) npg_depth_map_close(&m);
-    *out = m;
+    if (status) npg_depth_map_close(out);
     return status;
 }
 
 void npg_depth_map_close(npg_depth_map **map)
 {
-    if (!map || !*map) return;
-    npg_arena_release(&(*map)->arena);
-    npg_release(map);
+    npg_object_close(map);
 }
 
 /* ---- looking ---- */

@@ -319,8 +319,12 @@ npg_status npg_mesh_require_finite(const npg_mesh *mesh, const char *path);
  * (2 components - vertices + edges - faces - border loops) / 2. */
 npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh);
 
-/* Keep the faces whose keep_face is not 0 and the vertices they use, in order.
- * Vertex data goes with them. */
+/* A mesh of these faces over the whole's vertices: those that they use, in order, with their data (of corners:
+ * without), and which of the whole each one is; both are the caller's. */
+npg_status npg_mesh_of_faces(npg_mesh **out, uint32_t **which, const npg_mesh *whole, const uint32_t *faces,
+                             size_t face_count);
+
+/* Keep the faces whose keep_face is not 0 and the vertices they use, likewise. */
 npg_status npg_mesh_keep_faces(npg_mesh **mesh, const uint8_t *keep_face);
 
 /* out (count x 3) = the rows of rows (x 3) that which[] names. */
@@ -541,7 +545,7 @@ void npg_attach_close(npg_attachment **attachment);
 #define NPG_PROXY_SURFACE 10000
 
 typedef struct npg_proxy {
-    npg_mesh *mesh;   /* T vertices, with normals and mask where the whole has them; counted reference */
+    npg_mesh *mesh;   /* T vertices, with what the whole's have; counted reference */
     uint32_t *vertex; /* T, ascending: which vertex of the whole each one is                  */
 } npg_proxy;
 
@@ -564,11 +568,11 @@ uint64_t npg_cell_key_of_double(uint64_t key);
 
 /* Keys, numbered in the order in which they were met (open addressing). */
 typedef struct npg_cell_table {
+    npg_arena arena; /* of both; the owner's arrays by number may be taken from it, too */
     uint64_t *keys;  /* count                                             */
     uint32_t *place; /* 2^bits places: the number of a key, NPG_CELL_NONE */
     size_t count, most;
     int bits;
-    npg_arena arena; /* of both; the owner's arrays by number may be taken from it, too */
 } npg_cell_table;
 
 #define NPG_CELL_NONE UINT32_MAX

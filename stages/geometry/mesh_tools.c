@@ -279,62 +279,69 @@ npg_status npg_mesh_handles(int64_t *handles, const npg_mesh *mesh)
     return NPG_OK;
 }
 
-static void copy_vertex(npg_mesh *out, size_t to, const npg_mesh *mesh, size_t from)
-{
-    memcpy(out->vert_pos + 3 * to, mesh->vert_pos + 3 * from, 3 * sizeof(float));
-    if (out->vert_normals)
-        memcpy(out->vert_normals + 3 * to, mesh->vert_normals + 3 * from, 3 * sizeof(float));
-    if (out->vert_colours) memcpy(out->vert_colours + 4 * to, mesh->vert_colours + 4 * from, 4);
-    if (out->vert_unseen) out->vert_unseen[to] = mesh->vert_unseen[from];
-    if (out->vert_uvs) memcpy(out->vert_uvs + 2 * to, mesh->vert_uvs + 2 * from, 2 * sizeof(float));
-}
+/* What a vertex has, where the mesh has it. */
+static const struct {
+    size_t offset, row; /* of the array in npg_mesh, and bytes of a vertex */
+} vertex_data[] = {{offsetof(npg_mesh, vert_pos), 3 * sizeof(float)},
+                   {offsetof(npg_mesh, vert_normals), 3 * sizeof(float)},
+                   {offsetof(npg_mesh, vert_colours), 4},
+                   {offsetof(npg_mesh, vert_unseen), 1},
+                   {offsetof(npg_mesh, vert_uvs), 2 * sizeof(float)}};
 
-/* The new number of every vertex that a kept face uses, UINT32_MAX for the others. */
-static void number_kept(uint32_t *number, size_t *vert_count, size_t *face_count, const npg_mesh *mesh,
-                        const uint8_t *keep_face)
+static npg_status copy_vertices(npg_mesh *out, const npg_mesh *whole, const uint32_t *which)
 {
-    *vert_count = *face_count = 0;
-    memset(number, 0xff, mesh->vert_count * sizeof *number);
-    for (size_t f = 0; f < mesh->face_count; f++)
-        for (int k = 0; k < 3 && keep_face[f]; k++) number[mesh->faces[3 * f + (size_t)k]] = 0;
-    for (size_t f = 0; f < mesh->face_count; f++) *face_count += keep_face[f] != 0;
-    for (size_t i = 0; i < mesh->vert_count; i++)
-        if (number[i] != UINT32_MAX) number[i] = (uint32_t)(*vert_count)++;
-}
-
-/* Room in `out` for the vertex data that `mesh` has beside positions. */
-static npg_status alloc_vertex_data(npg_mesh *out, const npg_mesh *mesh)
-{
-    size_t v = out->vert_count;
-    if (mesh->vert_normals) NPG_TRY(npg_alloc_array(&out->vert_normals, NPG_FOR_MESH, v, 3 * sizeof(float)));
-    if (mesh->vert_colours) NPG_TRY(npg_alloc_array(&out->vert_colours, NPG_FOR_MESH, v, 4));
-    if (mesh->vert_unseen) NPG_TRY(npg_alloc(&out->vert_unseen, NPG_FOR_MESH, v));
-    if (mesh->vert_uvs) NPG_TRY(npg_alloc_array(&out->vert_uvs, NPG_FOR_MESH, v, 2 * sizeof(float)));
+    for (size_t i = 0; i < sizeof vertex_data / sizeof *vertex_data; i++) {
+        size_t offset = vertex_data[i].offset, row = vertex_data[i].row;
+        char *from, *to;
+        memcpy(&from, (const char *)whole + offset, sizeof from);
+        memcpy(&to, (char *)out + offset, sizeof to);
+        if (!from) continue;
+        if (!to) NPG_TRY(npg_alloc_array(&to, NPG_FOR_MESH, out->vert_count, row));
+        memcpy((char *)out + offset, &to, sizeof to);
+        for (size_t v = 0; v < out->vert_count; v++) memcpy(to + v * row, from + which[v] * row, row);
+    }
     return NPG_OK;
 }
 
-static void copy_kept(npg_mesh *out, const npg_mesh *mesh, const uint32_t *number, const uint8_t *keep_face)
+npg_status npg_mesh_of_faces(npg_mesh **out, uint32_t **which, const npg_mesh *whole, const uint32_t *faces,
+                             size_t face_count)
 {
-    for (size_t i = 0; i < mesh->vert_count; i++)
-        if (number[i] != UINT32_MAX) copy_vertex(out, number[i], mesh, i);
-    for (size_t f = 0, to = 0; f < mesh->face_count; f++)
-        for (int k = 0; k < 3 && keep_face[f]; k++) out->faces[to++] = number[mesh->faces[3 * f + (size_t)k]];
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    size_t count = 0, v = whole->vert_count;
+    uint32_t *number = npg_arena_take(&scratch, v, sizeof *number);
+    *out = NULL;
+    *which = NULL;
+    npg_status status = npg_arena_status(&scratch);
+    for (size_t i = 0; i < 3 * face_count && !status; i++) number[faces[i]] = 1;
+    for (size_t i = 0; i < v && !status; i++) number[i] = number[i] ? (uint32_t)count++ : UINT32_MAX;
+    if (!status) status = npg_mesh_open(out, count, face_count);
+    if (!status) status = npg_alloc_array(which, NPG_FOR_MESH, count, sizeof **which);
+    for (size_t i = 0; i < v && !status; i++)
+        if (number[i] != UINT32_MAX) (*which)[number[i]] = (uint32_t)i;
+    for (size_t i = 0; i < 3 * face_count && !status; i++) (*out)->faces[i] = number[faces[i]];
+    if (!status) status = copy_vertices(*out, whole, *which);
+    npg_arena_release(&scratch);
+    if (!status) return NPG_OK;
+    npg_mesh_unref(out);
+    npg_release(which);
+    return status;
 }
 
 npg_status npg_mesh_keep_faces(npg_mesh **slot, const uint8_t *keep_face)
 {
-    npg_mesh *mesh = *slot, *out = NULL;
-    uint32_t *number;
-    size_t vert_count, face_count;
-    NPG_TRY(npg_alloc_array(&number, NPG_FOR_MESH, mesh->vert_count, sizeof *number));
-    number_kept(number, &vert_count, &face_count, mesh, keep_face);
-    npg_status status = npg_mesh_open(&out, vert_count, face_count);
-    if (!status) status = alloc_vertex_data(out, mesh);
-    if (!status) copy_kept(out, mesh, number, keep_face);
-    npg_release(&number);
-    npg_mesh_unref(status ? &out : slot);
-    if (!status) *slot = out;
-    return status;
+    npg_mesh *out = NULL;
+    uint32_t *faces, *which;
+    size_t kept = 0;
+    NPG_TRY(npg_alloc_array(&faces, NPG_FOR_MESH, (*slot)->face_count, 3 * sizeof *faces));
+    for (size_t f = 0; f < (*slot)->face_count; f++)
+        if (keep_face[f]) memcpy(faces + 3 * kept++, (*slot)->faces + 3 * f, 3 * sizeof *faces);
+    npg_status status = npg_mesh_of_faces(&out, &which, *slot, faces, kept);
+    npg_release(&faces);
+    npg_release(&which);
+    if (status) return status;
+    npg_mesh_unref(slot);
+    *slot = out;
+    return NPG_OK;
 }
 
 void npg_rows_gather(float *out, const float *rows, const uint32_t *which, size_t count)
