@@ -5,11 +5,12 @@
 
 /* clang-format off */
 static const char *const gone[][2] = { /* "VERB NAME": of that verb alone */
+    {"welds",          "nothing is cut: it took limbs, and improved no figure"},
     {"quality",        "--method best"},
     {"config",         "--method FILE"},
     {"voxel",              "thin the capture before the run; points-max of the method thins what is too dense"},
     {"outlier-neighbours", "always 12"},
-    {"normal-neighbours",  "several numbers are tried"},
+    {"normal-neighbours",  "always 12"},
     {"tuning",         "the set of kernel parameters is chosen by device"},
     {"rotation",       "rotations are quaternions: others made no difference"},
     {"hidden-layers",  "the decoder has two, as the published code's; --method '{\"width-1\": 128}' is a smaller one"},

@@ -7,12 +7,9 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "pipeline/order.h"
 
-#define SPACING_NEIGHBOUR 8
-#define SPACING_ASKED     20000 /* points at most that are asked for their neighbours */
-#define PIECE_SHARE       0.01  /* of the area: a piece that may belong to the body ... */
-#define PIECE_DIST        0.1   /* ... of this size: so near the largest, does          */
+#define PIECE_SHARE 0.01 /* of the area: a piece that may belong to the body ... */
+#define PIECE_DIST  0.1  /* ... of this size: so near the largest, does          */
 
 npg_status npg_points_dist(float *dist, const float *queries, size_t query_count, const float *points,
                            size_t point_count)
@@ -22,27 +19,6 @@ npg_status npg_points_dist(float *dist, const float *queries, size_t query_count
     npg_status status = npg_points_nearest(index, dist, points, point_count, queries, query_count, 1);
     for (size_t i = 0; i < query_count && !status; i++) dist[i] = sqrtf(dist[i]);
     npg_release(&index);
-    return status;
-}
-
-/* Of the distances to k neighbours each the farthest; and of these the median.  Overwrites the list. */
-static float median_farthest(float *dist_sq, size_t count, size_t k)
-{
-    for (size_t i = 0; i < count; i++) dist_sq[i] = dist_sq[k * i + k - 1];
-    qsort(dist_sq, count, sizeof *dist_sq, npg_order_float);
-    return dist_sq[count / 2];
-}
-
-npg_status npg_cloud_spacing(double *spacing, const float *points, size_t n)
-{
-    npg_arena scratch = {.purpose = NPG_FOR_MESH};
-    npg_neighbours near;
-    size_t k = SPACING_NEIGHBOUR + 1, asked = n < SPACING_ASKED ? n : SPACING_ASKED;
-    float *queries = npg_arena_take(&scratch, asked, 3 * sizeof *queries);
-    if (queries) npg_points_spread(queries, NULL, asked, points, NULL, n);
-    npg_status status = npg_neighbours_take(&near, &scratch, points, n, queries, asked, k);
-    if (!status) *spacing = sqrt((double)median_farthest(near.dist_sq, asked, k));
-    npg_arena_release(&scratch);
     return status;
 }
 

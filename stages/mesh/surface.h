@@ -2,6 +2,7 @@
 #ifndef NPG_MESH_SURFACE_H
 #define NPG_MESH_SURFACE_H
 
+#include "outlier/normals.h"
 #include "pipeline/mesh.h"
 #include "pipeline/options.h"
 #include "pipeline/stage.h"
@@ -82,15 +83,9 @@ npg_status npg_poisson(npg_mesh **mesh, const float *points, const float *normal
 npg_status npg_resurface(npg_mesh **mesh, size_t *moved, size_t *turned, float *normals, const float *points,
                          size_t point_count, double spacing, const npg_poisson_settings *settings);
 
-/* Denoise: how noisy a cloud is, and a smoother version of an oriented one.  N x 3 arrays; NPG_MEMORY. */
-
-/* Standard deviation of the points across their surface.  Residuals to planes through 8 and through 24
- * neighbours are noise plus curvature, and only curvature grows with the neighbourhood (with its area): the
- * difference tells them apart.  normals (outward) or NULL: with them, points of thin parts, which have another
- * side among those neighbours, are not asked, unless nine in ten are; how far that side is is no noise. */
-npg_status npg_cloud_noise(double *sigma, const float *points, const float *normals, size_t point_count);
-
-/* Move every point onto the quadric z = a + bx + cy + dx^2 + exy + fy^2 fitted over its tangent plane to its
+/* Denoise.  N x 3 arrays; NPG_MEMORY.
+ *
+ * Move every point onto the quadric z = a + bx + cy + dx^2 + exy + fy^2 fitted over its tangent plane to its
  * `neighbours` nearest points of the same side, weighted by distance; normals follow.  In place.  Points
  * without enough neighbours of their side stay.  Based on: F. Cazals, M. Pouget, Estimating Differential
  * Quantities Using Polynomial Fitting of Osculating Jets, 2005. */
@@ -105,9 +100,6 @@ npg_status npg_cloud_smooth(float *points, float *normals, size_t point_count, i
 /* Distance of each of V places to the nearest of N points.  dist: V. */
 npg_status npg_points_dist(float *dist, const float *places, size_t place_count, const float *points,
                            size_t point_count);
-
-/* Median distance to the 8th neighbour, over the points: how dense a cloud is. */
-npg_status npg_cloud_spacing(double *spacing, const float *points, size_t point_count);
 
 /* Drop the faces of which a vertex is farther than dist_max from every point.  *share gets the share of the
  * area that went. */

@@ -1,4 +1,4 @@
-/* Normals: principal components, and the side of a sensor. */
+/* Normals: principal components, the side of a sensor, and that of the winding number. */
 #include "outlier/normals.h"
 
 #include <math.h>
@@ -39,50 +39,27 @@ void npg_normal_of(float normal[3], const float *points, size_t count)
 }
 
 typedef struct estimate {
-    float *const *normals; /* one list per number of neighbours */
-    const int *neighbours;
-    size_t count;
+    float *normals;
+    size_t neighbours;
     const float *points;
 } estimate;
 
-/* An npg_kdtree_visit: lists are nearest first, so that fewer neighbours are the beginning of more. */
+/* An npg_kdtree_visit. */
 static void estimate_point(void *user, uint32_t point, const uint32_t *index, const float *dist_sq)
 {
     const estimate *e = user;
     float around[3 * NPG_KDTREE_NEIGHBOURS];
+    size_t found = 0;
     (void)dist_sq;
-    for (size_t i = 0, found = 0; i < e->count; i++) {
-        for (; found < (size_t)e->neighbours[i] && index[found] != UINT32_MAX; found++)
-            memcpy(around + 3 * found, e->points + 3 * (size_t)index[found], 3 * sizeof *around);
-        npg_normal_of(e->normals[i] + 3 * (size_t)point, around, found);
-    }
-}
-
-npg_status npg_normals_estimate_at(float *const *normals, const uint32_t *at, size_t at_count,
-                                   const float *points, size_t n, const int *neighbours, size_t count)
-{
-    npg_kdtree *tree = NULL;
-    size_t most = (size_t)neighbours[count - 1];
-    estimate e = {.normals = normals, .neighbours = neighbours, .count = count, .points = points};
-    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
-    float *queries = npg_arena_take(&scratch, at_count, 3 * sizeof *queries);
-    uint32_t *index = npg_arena_take(&scratch, at_count, most * sizeof *index);
-    float *dist_sq = npg_arena_take(&scratch, at_count, most * sizeof *dist_sq);
-    npg_status status = npg_arena_status(&scratch);
-    if (!status) status = npg_kdtree_open(&tree, points, n);
-    if (!status) npg_rows_gather(queries, points, at, at_count);
-    if (!status) status = npg_kdtree_nearest(tree, index, dist_sq, queries, at_count, most, 0);
-    for (size_t i = 0; i < at_count && !status; i++)
-        estimate_point(&e, (uint32_t)i, index + most * i, dist_sq + most * i);
-    npg_kdtree_close(&tree);
-    npg_arena_release(&scratch);
-    return status;
+    for (; found < e->neighbours && index[found] != UINT32_MAX; found++)
+        memcpy(around + 3 * found, e->points + 3 * (size_t)index[found], 3 * sizeof *around);
+    npg_normal_of(e->normals + 3 * (size_t)point, around, found);
 }
 
 npg_status npg_normals_estimate(float *normals, const float *points, size_t n, int neighbours)
 {
     npg_kdtree *tree = NULL;
-    estimate e = {.normals = &normals, .neighbours = &neighbours, .count = 1, .points = points};
+    estimate e = {.normals = normals, .neighbours = (size_t)neighbours, .points = points};
     NPG_REQUIRE(neighbours >= 3 && neighbours <= NPG_KDTREE_NEIGHBOURS);
     NPG_TRY(npg_kdtree_open(&tree, points, n));
     npg_status status = npg_kdtree_each(tree, (size_t)neighbours, NULL, estimate_point, &e, 0);
@@ -104,4 +81,37 @@ void npg_normals_face_sensor(float *normals, size_t *flipped, const float *point
         for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
         ++*flipped;
     }
+}
+
+/* ---- winding number ---- */
+
+static npg_status turn_to_field(float *normals, size_t *flipped, const float *points, const float *given,
+                                size_t n)
+{
+    float *field;
+    *flipped = 0;
+    NPG_TRY(npg_alloc_array(&field, NPG_FOR_FRAMES, n, 3 * sizeof *field));
+    memcpy(field, normals, n * 3 * sizeof *field);
+    npg_status status = npg_winding_normals(field, points, given, n);
+    for (size_t i = 0; i < n && !status; i++) {
+        if (npg_vec3_dotf(normals + 3 * i, field + 3 * i) >= 0) continue;
+        for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
+        ++*flipped;
+    }
+    npg_release(&field);
+    return status;
+}
+
+/* Of large clouds the field has sides, but directions only as coarse as the points it is made of. */
+npg_status npg_normals_make(float *normals, const float *points, size_t n)
+{
+    size_t flipped;
+    NPG_TRY(npg_normals_estimate(normals, points, n, NPG_NEIGHBOURS));
+    if (npg_winding_is_whole(n)) return npg_winding_normals(normals, points, NULL, n);
+    return turn_to_field(normals, &flipped, points, NULL, n);
+}
+
+npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t n)
+{
+    return turn_to_field(normals, flipped, points, normals, n);
 }

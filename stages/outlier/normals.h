@@ -1,5 +1,5 @@
-/* Normals: direction by principal components, side by agreement with neighbours and by the winding number of
- * the whole cloud (closed bodies: outward) or by the sensor (single views: toward it).
+/* Normals: by the winding number of the whole cloud (closed bodies: outward), or by principal components and the
+ * sensor (single views: toward it); and how dense and noisy a cloud is.
  *
  * points and normals: N x 3, points finite.  Every function gives the same result for every number of threads
  * and may fail with NPG_MEMORY only, unless said otherwise. */
@@ -19,22 +19,32 @@ void npg_normal_of(float normal[3], const float *points, size_t point_count);
 /* Unit normals without a side: the direction in which the `neighbours` nearest points spread least. */
 npg_status npg_normals_estimate(float *normals, const float *points, size_t point_count, int neighbours);
 
-/* The same at `at_count` of the points alone, for several numbers of neighbours among all N, ascending, at once:
- * normals[i] (at_count x 3) are those of neighbours[i]. */
-npg_status npg_normals_estimate_at(float *const *normals, const uint32_t *at, size_t at_count,
-                                   const float *points, size_t point_count, const int *neighbours,
-                                   size_t count);
-
 /* Turn every normal toward the sensor (same coordinates as the points).  *flipped counts the turned ones. */
 void npg_normals_face_sensor(float *normals, size_t *flipped, const float *points, size_t point_count,
                              const double sensor[3]);
 
-/* Estimate and orient with several numbers of neighbours and keep the result whose sides fit together best: few
- * follow thin limbs, many see through noise.  Outward for closed bodies, to the convex side for open ones. */
+/* Winding: unit normals of all points together, outward of what they enclose (to the convex side of what is
+ * open): winding.c has the formula.  given (N x 3, unit, some on the wrong side): where to begin, or NULL.  Of
+ * large clouds an even choice of points makes the field, and the normals of all are read from it, as coarse as
+ * those points are: npg_winding_is_whole() says whether all took part.  A point without any direction keeps
+ * what normals has.  N >= 1.  The time goes with the square of the points, 8000 at most.  NPG_MEMORY. */
+npg_status npg_winding_normals(float *normals, const float *points, const float *given, size_t point_count);
+bool npg_winding_is_whole(size_t point_count);
+
+/* Unit normals from nothing: outward for closed bodies, to the convex side for open ones. */
 npg_status npg_normals_make(float *normals, const float *points, size_t point_count);
 
-/* Find normals on the wrong side among given ones and turn them: by neighbours and winding number, beginning
- * from the sides given.  *flipped counts the turned ones. */
+/* Find normals on the wrong side among given ones (unit length) and turn them, beginning from the sides given.
+ * *flipped counts the turned ones. */
 npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t point_count);
+
+/* Median distance to the 8th neighbour, over the points: how dense a cloud is. */
+npg_status npg_cloud_spacing(double *spacing, const float *points, size_t point_count);
+
+/* Standard deviation of the points across their surface.  Residuals to planes through 8 and through 24
+ * neighbours are noise plus curvature, and only curvature grows with the neighbourhood (with its area): the
+ * difference tells them apart.  normals (outward) or NULL: with them, points of thin parts, which have another
+ * side among those neighbours, are not asked, unless nine in ten are; how far that side is is no noise. */
+npg_status npg_cloud_noise(double *sigma, const float *points, const float *normals, size_t point_count);
 
 #endif

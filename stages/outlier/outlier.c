@@ -16,7 +16,7 @@
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"
 
-#define NORMAL_NEIGHBOURS 16 /* of normals that a sensor turns; npg_normals_make() tries it, too */
+#define NORMAL_NEIGHBOURS 16 /* of normals that a sensor turns */
 
 enum { NORMALS_AUTO, NORMALS_ESTIMATE, NORMALS_GIVEN };
 enum { FOR_KEY, FOR_ALL };
