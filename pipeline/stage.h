@@ -48,8 +48,7 @@ typedef enum npg_pass {
 typedef struct npg_choice {
     size_t count, candidate_count; /* count 0: there is no choosing pass */
     int64_t frames[NPG_CHOICE_FRAMES];
-    bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them        */
-    bool cut_welds;                       /* cut from the reference what the other frames contradict */
+    bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
 } npg_choice;
 
 /* Whether the frame with this index is one of the candidates. */

@@ -26,7 +26,6 @@ const npg_stage *const npg_chain[] = {
         {"keyframe-choice", "paper"},  /* by score alone */                                                  \
         {"smooth", "no"},              /* the keyframe's points as they are */                               \
         {"unseen", "keep"},            /* as Poisson closed it */                                            \
-        {"welds", "keep"},             /* nothing is cut */                                                  \
         {"window", "-1"}               /* all frames at once, up to 60 */
 static const npg_preset_value paper[] = {PAPER, {"epochs", "250"}, {NULL, NULL}};
 static const npg_preset_value paper_1000[] = {PAPER, {"epochs", "1000"}, {NULL, NULL}}; /* the slower setting */

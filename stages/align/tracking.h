@@ -256,7 +256,7 @@ void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const do
  * fares in the others.
  *
  * A surface from one frame is followed from frame to frame by the coarse tracker (tracking.h), outward in both
- * directions.  Where limbs that touch in its frame were welded, the weld must either hold other frames' limbs
+ * directions.  Where limbs that touch in its frame were joined, that must either hold other frames' limbs
  * together, away from their points, or stretch far: both can be seen. */
 
 #define NPG_CANDIDATE_POINTS 8000 /* of a frame, at most */

@@ -88,7 +88,8 @@ static npg_status try_one(const choosing *c, npg_candidate *one)
 {
     npg_mesh *draft;
     NPG_TRY(make_draft(&draft, &c->clouds->list[one->at], c->judging.spacing_unit, c->settings));
-    npg_status status = npg_judge(&one->judgement, c->clouds, one->at, draft, &c->judging);
+    npg_status status = npg_mesh_handles(&one->handles, draft);
+    if (!status) status = npg_judge(&one->judgement, c->clouds, one->at, draft, &c->judging);
     one->is_followed = !status;
     npg_mesh_unref(&draft);
     return status;
@@ -112,17 +113,21 @@ static void list_candidates(choosing *c)
     }
 }
 
-/* The least of those that are better than the one by score, beyond chance. */
+/* Parts that touch in one frame are joined in its surface, which is a handle more; none is ever joined too
+ * little.  So of those that points can't tell apart the one of fewer handles is taken. */
+static bool is_better(const npg_candidate *one, const npg_candidate *other)
+{
+    if (npg_judged_better(&one->judgement, &other->judgement)) return true;
+    return one->handles < other->handles && !npg_judged_worse(&one->judgement, &other->judgement);
+}
+
+/* From the one by score on, to what is better. */
 static size_t best_of(const npg_candidate *list, size_t count, size_t scored)
 {
     size_t best = scored;
     for (size_t i = 0; i < count; i++) {
         if (!list[i].is_followed || i == scored) continue;
-        bool is_better = scored == count || !list[scored].is_followed ||
-                         npg_judged_better(&list[i].judgement, &list[scored].judgement);
-        bool is_least =
-            best == count || !list[best].is_followed || list[i].judgement.mean < list[best].judgement.mean;
-        if (is_better && is_least) best = i;
+        if (best == count || !list[best].is_followed || is_better(&list[i], &list[best])) best = i;
     }
     return best < count ? best : 0;
 }
@@ -165,9 +170,9 @@ static void report_candidates(npg_worker *worker, const npg_candidate *list, siz
     for (size_t i = 0; i < count; i++)
         json_array_append_new(
             of,
-            json_pack("{sI sb so sI}", "number", (json_int_t)list[i].number, "followed", list[i].is_followed,
+            json_pack("{sI sb so sI sI}", "number", (json_int_t)list[i].number, "followed", list[i].is_followed,
                       "judged", npg_json_real(list[i].is_followed ? list[i].judgement.mean : (double)NAN),
-                      "frames", (json_int_t)list[i].judgement.count));
+                      "frames", (json_int_t)list[i].judgement.count, "handles", (json_int_t)list[i].handles));
     json_object_set_new(npg_worker_report(worker), "candidates", of);
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }

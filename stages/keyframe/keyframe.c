@@ -25,7 +25,6 @@
 #define MIDDLE_REACH 24 /* frames from the middle, within which it hardly weighs against area */
 
 enum { CHOICE_PAPER, CHOICE_JUDGED };
-enum { WELDS_KEEP, WELDS_CUT };
 
 typedef struct candidate {
     int64_t index, number;
@@ -35,7 +34,7 @@ typedef struct candidate {
 
 typedef struct keyframe_state {
     int64_t number, window, overlap; /* options */
-    int choice, welds;               /* options */
+    int choice;                      /* option */
     double box_margin;               /* option */
     npg_extent *extent;              /* from the first usable frame on; owned */
     candidate best[SHOWN_SCORES];    /* best first */
@@ -294,11 +293,9 @@ static void set_choice(npg_worker *worker)
 {
     const keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    bool cuts_welds = state->welds == WELDS_CUT && !*own_mesh(worker),
-         chooses = has_candidates(worker) && !goes_by_area(worker);
-    if (facts->planned_count < 2 || (!chooses && !cuts_welds)) return;
+    bool chooses = has_candidates(worker) && !goes_by_area(worker);
+    if (facts->planned_count < 2 || *own_mesh(worker) || state->choice == CHOICE_PAPER) return;
     npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count, !chooses);
-    npg_own(worker, choice)->cut_welds = cuts_welds;
 }
 
 static void report_key(npg_worker *worker, const candidate *key)
@@ -480,9 +477,6 @@ static const npg_option options[] = {
     NPG_KEY(CHOICE, "keyframe-choice", AT(choice),     "judged", "paper|judged",
         "Take the frame with the paper's score (paper), "
         "or the one of several whose surface fares best in the others (judged)"),
-    NPG_KEY(CHOICE, "welds",           AT(welds),      "cut",   "keep|cut",
-        "Surface of the reference that other frames stretch far from all points: "
-        "cut it and close the holes, or keep it"),
     NPG_KEY(INT,    "window",          AT(window),     "24",    -1, 1e6,  NULL,
         "Frames that are solved together; 0: all of them in one window; "
         "-1: so up to 60 frames, and windows of 24 where there are more"),

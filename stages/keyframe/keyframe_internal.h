@@ -83,12 +83,13 @@ npg_status npg_outside_restore(npg_outside *outside, const npg_record *in, const
  * nothing of limbs that touch, of what a sensor did not see, or of a pose that is hard to follow from.  So
  * frames spread over the sample are tried, too: each one's points are made a draft surface, and the judge
  * (reference/reference.h) says how it fares.  The frame by score stays unless another is better beyond
- * chance. */
+ * chance, or as good with fewer handles. */
 
 typedef struct npg_candidate {
     size_t at; /* place in the clouds */
     int64_t index, number;
     bool is_followed; /* false: no surface could be made, or it was lost */
+    int64_t handles;  /* of the draft                                    */
     npg_judgement judgement;
 } npg_candidate;
 

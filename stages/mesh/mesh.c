@@ -143,44 +143,6 @@ static npg_status keep_uncontradicted(making *m)
     return NPG_OK;
 }
 
-/* ---- false bridges ---- */
-
-static void report_false_bridges(making *m, const npg_bridge_cut *cut)
-{
-    npg_mesh_note(m->worker, "handles", (double)cut->handles);
-    npg_mesh_note_count(m->worker, "weld_frames", cut->frames);
-    npg_mesh_note_count(m->worker, "welds_cut", cut->patches);
-    npg_mesh_note_count(m->worker, "weld_faces_cut", cut->faces);
-    npg_mesh_note(m->worker, "weld_area_share", cut->area_share);
-    npg_mesh_note_count(m->worker, "welds_refused", cut->refused);
-    if (cut->patches)
-        npg_worker_log(
-            m->worker, NPG_LOG_INFO, m->key->number,
-            "%zu false bridges that other frames pull apart were cut: %zu faces, %.2f %% of the area",
-            cut->patches, cut->faces, 100 * cut->area_share);
-    if (cut->refused)
-        npg_worker_log(m->worker, NPG_LOG_INFO, m->key->number,
-                       "%zu patches that other frames stretch could not be cut cleanly and stay",
-                       cut->refused);
-}
-
-/* Cut what the frames of the choosing pass contradict.  The cut itself is no reason to fail. */
-static npg_status cut_false_bridges(making *m)
-{
-    const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
-    npg_bridge_settings settings = {
-        .spacing_unit = m->set.spacing, .should_stop = npg_worker_should_stop, .user = m->worker};
-    npg_bridge_cut done;
-    if (!clouds || !npg_worker_facts(m->worker)->choice.cut_welds) return NPG_OK;
-    size_t at = npg_candidate_clouds_find(clouds, m->key->index);
-    double since = npg_clock_s();
-    npg_status status =
-        at < clouds->count ? npg_bridge_cut_all(&m->mesh, &done, clouds, at, &settings) : NPG_OK;
-    if (!status && at < clouds->count) report_false_bridges(m, &done);
-    npg_mesh_note(m->worker, "welds_s", npg_clock_s() - since);
-    return status == NPG_DIVERGED ? NPG_OK : status;
-}
-
 /* ---- what nobody saw ---- */
 
 /* More than the bar of surface that no point saw is carried through all frames. */
@@ -261,8 +223,11 @@ static npg_status measure_reference(making *m)
 {
     npg_manifold manifold;
     npg_mesh *mesh = m->mesh;
+    int64_t handles;
     NPG_TRY(npg_mesh_manifold(&manifold, mesh));
+    NPG_TRY(npg_mesh_handles(&handles, mesh));
     NPG_TRY(npg_mesh_make_normals(mesh));
+    npg_mesh_note(m->worker, "handles", (double)handles);
     npg_mesh_note_count(m->worker, "vertices", mesh->vert_count);
     npg_mesh_note_count(m->worker, "faces", mesh->face_count);
     npg_mesh_note_count(m->worker, "border_edges", manifold.border_edges);
@@ -355,7 +320,6 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
     if (!status) status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);
-    if (!status && !is_given && !trims) status = cut_false_bridges(&m);
     if (!status) status = measure_reference(&m);
     if (!status && !trims) status = take_back_if_worse(&m);
     if (!status) status = judge_invented(&m);

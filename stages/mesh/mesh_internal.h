@@ -89,7 +89,7 @@ npg_status npg_reconstruct(npg_mesh **mesh, double *invented_share, npg_worker *
 
 /* Gap widening: keep parts of a body that nearly touch from being joined by the reconstruction.
  *
- * Poisson closes a gap that is narrower than the points are apart, and a false bridge once made stretches into
+ * Poisson closes a gap that is narrower than the points are apart, and a bridge once made stretches into
  * a web in every frame where the parts move away from each other.  So points that face each other across a
  * narrow gap are first moved away from it, into their own part, until the gap is wide enough to survive; the
  * surface is made; then its vertices are moved back by what the points around them were moved.  The surface
@@ -187,25 +187,6 @@ double npg_mesh_share_in(const npg_mesh *mesh, const npg_cube_set *cubes);
  * N >= 1; faces without points near them keep their slope.  Equal input gives equal bits.  NPG_MEMORY. */
 npg_status npg_mesh_denoise(npg_mesh *mesh, const float *points, const float *normals, size_t point_count);
 
-/* Loop fill: triangles that close a hole.
- *
- * Based on: Gill Barequet, Micha Sharir, Filling Gaps in the Boundary of a Polyhedron, 1995: of all
- * triangulations of the loop, the one of least area, by dynamic programming. */
-
-#define NPG_LOOP_MOST 400 /* vertices of a loop, at most */
-
-/* A loop of n vertices in the order the new faces should turn (against the faces around the hole). */
-typedef struct npg_loop {
-    const uint32_t *verts; /* n, all different */
-    size_t count;
-} npg_loop;
-
-/* n - 2 faces (3 indices each) over the loop, least area with the vertices at vert_pos (V x 3).  edges: those
- * of the mesh, as npg_mesh_edges() gives them; none of them is made a second time.  *area is that of the new
- * faces.  *is_filled is false when the loop is too long or nothing fits.  NPG_MEMORY. */
-npg_status npg_loop_fill(uint32_t *faces, double *area, bool *is_filled, npg_loop loop, const float *vert_pos,
-                         const uint32_t (*edges)[2], size_t edge_count);
-
 /* Unseen: which vertices of the finished reference no point supports that it was made from. */
 
 /* Set mesh->vert_unseen: the vertices that are farther than dist_max from all N points (N x 3).  NPG_MEMORY. */
@@ -221,37 +202,5 @@ npg_status npg_unseen_measure(double *share, npg_patch *largest, const npg_mesh 
 /* Where that part lies, for the report: {share, at, radius} in world units, and in words into text; JSON null
  * and "" where it has no area. */
 json_t *npg_unseen_place(const npg_patch *largest, const npg_frame_box *box, char *text, size_t size);
-
-/* False bridge: surface of the reference that joins what other frames hold apart, found and cut.
- *
- * The reference is followed through the other frames (npg_candidate_follow()).  A frame contradicts a face when
- * it stretches the face's longest edge to twice its length and has the corners far from every point, though
- * the surface explains the frame on the whole; faces beside it that are nearly contradicted go with it.
- * Patches of faces that three frames or more contradict are cut, and the holes are closed in the pose that
- * stretched the patch most, where its sides are apart.
- * Only tubes are cut, patches with two border loops or more, which takes a handle from the mesh:
- * a crease that was closed too far can't be told from a part that was followed badly, so it stays
- * (gap widening and the choice of the keyframe see to those).  The result is closed and oriented where the
- * mesh was; a cut that can't be closed so, that would save no area or that would leave the mesh in pieces,
- * is not made. */
-
-typedef struct npg_bridge_cut {
-    size_t patches, faces; /* cut                                                  */
-    double area_share;     /* of the reference's area                              */
-    size_t refused;        /* patches that other frames contradict, but left alone */
-    size_t frames;         /* that the surface explains well enough to count       */
-    int64_t handles; /* of the mesh before; without any there is nothing to cut, and no frame is asked */
-} npg_bridge_cut;
-
-typedef struct npg_bridge_settings {
-    double spacing_unit; /* of the points, npg_cloud_spacing() */
-    bool (*should_stop)(void *user);
-    void *user;
-} npg_bridge_settings;
-
-/* mesh: unit coordinates, made from clouds->list[at]; replaced when something was cut (without normals then),
- * left alone otherwise.  NPG_MEMORY, NPG_STOPPED, NPG_DIVERGED. */
-npg_status npg_bridge_cut_all(npg_mesh **mesh, npg_bridge_cut *done, const npg_candidate_clouds *clouds,
-                              size_t at, const npg_bridge_settings *settings);
 
 #endif

@@ -204,3 +204,8 @@ bool npg_judged_better(const npg_judgement *one, const npg_judgement *other)
 {
     return npg_judged_against(one, other) < -2 && one->mean < CLEARLY * other->mean;
 }
+
+bool npg_judged_worse(const npg_judgement *one, const npg_judgement *other)
+{
+    return npg_judged_against(one, other) > 2;
+}

@@ -43,4 +43,7 @@ double npg_judged_against(const npg_judgement *one, const npg_judgement *other);
  * coarsely a surface is followed: judge.c. */
 bool npg_judged_better(const npg_judgement *one, const npg_judgement *other);
 
+/* Whether `one` is worse beyond chance, by however little. */
+bool npg_judged_worse(const npg_judgement *one, const npg_judgement *other);
+
 #endif

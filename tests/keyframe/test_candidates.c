@@ -1,4 +1,4 @@
-/* Choosing the keyframe and cutting welds, through the stages. */
+/* Choosing the keyframe, through the stages. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -51,13 +51,12 @@ static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *
     return legs_frame(frame, feet_at(index), 77 + (uint64_t)index);
 }
 
-static seen run(const char *choice, const char *welds)
+static seen run(const char *choice)
 {
     seen s = {0};
     char text[1024];
-    const char *settings[][2] = {
-        {"keyframe-choice", choice}, {"welds", welds},  {"pull", "no"}, {"output", "unused"},
-        {"input", "unused"},         {"faces", "6000"}, {NULL, NULL}};
+    const char *settings[][2] = {{"keyframe-choice", choice}, {"pull", "no"},    {"output", "unused"},
+                                 {"input", "unused"},         {"faces", "6000"}, {NULL, NULL}};
     script = (test_script){.frame_count = 10, .make = make, .see = see, .user = &s};
     npg_status status = run_chain(chain, settings, text);
     if (status) print_message("%s\n", text);
@@ -70,7 +69,7 @@ static seen run(const char *choice, const char *welds)
 static void the_score_alone_takes_touching_feet(void **state)
 {
     (void)state;
-    seen s = run("paper", "keep");
+    seen s = run("paper");
     assert_in_range(s.key, 3, 6);
     assert_true(s.euler < 2);
 }
@@ -78,21 +77,10 @@ static void the_score_alone_takes_touching_feet(void **state)
 static void a_frame_with_feet_apart_is_chosen(void **state)
 {
     (void)state;
-    seen s = run("judged", "keep");
+    seen s = run("judged");
     assert_true(s.key < 3 || s.key > 6);
     assert_int_equal(s.euler, 2);
     assert_int_equal(s.manifold.border_edges, 0);
-}
-
-static void a_weld_that_other_frames_pull_apart_is_cut(void **state)
-{
-    (void)state;
-    seen s = run("paper", "cut");
-    assert_in_range(s.key, 3, 6);
-    assert_int_equal(s.euler, 2);
-    assert_int_equal(s.manifold.border_edges, 0);
-    assert_int_equal(s.manifold.crowded_edges + s.manifold.misoriented_edges + s.manifold.degenerate_faces,
-                     0);
 }
 
 int main(void)
@@ -100,7 +88,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_score_alone_takes_touching_feet),
         cmocka_unit_test(a_frame_with_feet_apart_is_chosen),
-        cmocka_unit_test(a_weld_that_other_frames_pull_apart_is_cut),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

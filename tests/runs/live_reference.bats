@@ -59,7 +59,7 @@ report() {
     "$NEUPIG" run --follow noisy0/points -o followed "${small[@]}" -q
     same files piped
     same files followed
-    for key in key key_by_score candidates welds_cut; do
+    for key in key key_by_score candidates; do
         diff <(grep "\"$key\"" files/report.json) <(grep "\"$key\"" followed/report.json)
     done
 }

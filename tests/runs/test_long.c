@@ -71,10 +71,10 @@ static void look(void *user, const npg_progress *progress)
 static npg_status run_capture(const char *input, const char *output, watch *w)
 {
     const char *const settings[][2] = {
-        {"input", input},     {"output", output},    {"window", "6"},  {"overlap", "2"},
-        {"ring", "1"},        {"chunk", "1"},        {"cache", "0"},   {"keyframe-choice", "paper"},
-        {"welds", "keep"},    {"epochs", "2"},       {"faces", "400"}, {"align-nodes", "20"},
-        {"align-steps", "2"}, {"poisson-depth", "4"}};
+        {"input", input},      {"output", output}, {"window", "6"},       {"overlap", "2"},
+        {"ring", "1"},         {"chunk", "1"},     {"cache", "0"},        {"keyframe-choice", "paper"},
+        {"epochs", "2"},       {"faces", "400"},   {"align-nodes", "20"}, {"align-steps", "2"},
+        {"poisson-depth", "4"}};
     const npg_hooks hooks = {.struct_size = sizeof hooks, .user = w, .progress = look};
     npg_options *options = NULL;
     npg_run *run = NULL;

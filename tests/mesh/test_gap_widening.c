@@ -1,4 +1,4 @@
-/* The parts of choosing and cutting: contact, holding apart, twins, handles, filling of loops. */
+/* Holding apart what nearly touches, and the handles of a mesh, which say whether that was joined. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -62,54 +62,6 @@ static void twins_lie_across_their_edge(void **state)
     }
     assert_int_equal(borders, 3);
     npg_mesh_unref(&mesh);
-}
-
-/* ---- loops ---- */
-
-static void a_loop_is_filled_with_least_area(void **state)
-{
-    (void)state;
-    /* a folded square: the diagonal 0-2 makes two flat faces, 1-3 two that bulge */
-    const float pos[12] = {0, 0, 0, 1, 0, 0.9f, 1, 1, 0, 0, 1, 0.9f};
-    const uint32_t verts[4] = {0, 1, 2, 3};
-    const uint32_t edge[1][2] = {{0, 2}};
-    uint32_t faces[6];
-    double free_area, bound_area;
-    bool is_filled;
-    assert_int_equal(npg_loop_fill(faces, &free_area, &is_filled, (npg_loop){verts, 4}, pos, edge, 0),
-                     NPG_OK);
-    assert_true(is_filled);
-    double sum = npg_face_area(pos, faces) + npg_face_area(pos, faces + 3);
-    assert_true(fabs(sum - free_area) < 1e-6);
-    assert_int_equal(npg_loop_fill(faces, &bound_area, &is_filled, (npg_loop){verts, 4}, pos, edge, 1),
-                     NPG_OK);
-    assert_true(is_filled); /* the edge 0-2 exists: the other diagonal */
-    for (int f = 0; f < 2; f++) {
-        bool has_1 = false, has_3 = false;
-        for (int k = 0; k < 3; k++) {
-            has_1 |= faces[3 * f + k] == 1;
-            has_3 |= faces[3 * f + k] == 3;
-        }
-        assert_true(has_1 && has_3);
-    }
-    assert_true(bound_area >= free_area);
-}
-
-static void a_loop_that_cannot_be_filled_is_said(void **state)
-{
-    (void)state;
-    const float pos[12] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
-    const uint32_t verts[4] = {0, 1, 2, 3};
-    const uint32_t edges[2][2] = {{0, 2}, {1, 3}};
-    uint32_t faces[6];
-    double area;
-    bool is_filled = true;
-    assert_int_equal(npg_loop_fill(faces, &area, &is_filled, (npg_loop){verts, 4}, pos, edges, 2), NPG_OK);
-    assert_false(is_filled);
-    npg_memory_fail_at(1, true);
-    assert_int_equal(npg_loop_fill(faces, &area, &is_filled, (npg_loop){verts, 4}, pos, edges, 2),
-                     NPG_MEMORY);
-    npg_memory_fail_at(0, false);
 }
 
 /* ---- gaps ---- */
@@ -244,8 +196,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(handles_are_counted_with_and_without_a_border),
         cmocka_unit_test(twins_lie_across_their_edge),
-        cmocka_unit_test(a_loop_is_filled_with_least_area),
-        cmocka_unit_test(a_loop_that_cannot_be_filled_is_said),
         cmocka_unit_test(points_go_apart_and_the_surface_comes_back),
         cmocka_unit_test(loose_vertices_come_back_nearly),
         cmocka_unit_test(feet_that_nearly_touch_are_joined_unless_held_apart),
