@@ -46,7 +46,7 @@ static const npg_option options[] = {
         "steps of each window's joint fit, at most; 0 leaves the frames as the alignment put them"),
     NPG_KEY(INT,    "joint-points",      SETTING(energy.points), "5000",     10,   1e7,  "N",
         "most points of an aligned frame that pull at the surface"),
-    NPG_KEY(REAL,   "joint-shape",       SETTING(energy.shape),  "0.1",      0,    1e6,  NULL,
+    NPG_KEY(REAL,   "joint-shape",       SETTING(energy.shape),  "0.5",      0,    1e6,  NULL,
         "weight of the change of the surface's edges against the distance of a point, of aligned frames"),
     NPG_KEY(INT,    "time-frequencies",  GRID(frequencies),      "4",        1,    16,   "M",
         "frequencies of the time code; it has twice as many values"),
