@@ -113,23 +113,31 @@ static void list_candidates(choosing *c)
     }
 }
 
-/* Parts that touch in one frame are joined in its surface, which is a handle more; none is ever joined too
- * little.  So of those that points can't tell apart the one of fewer handles is taken. */
-static bool is_better(const npg_candidate *one, const npg_candidate *other)
-{
-    if (npg_judged_better(&one->judgement, &other->judgement)) return true;
-    return one->handles < other->handles && !npg_judged_worse(&one->judgement, &other->judgement);
-}
-
-/* From the one by score on, to what is better. */
-static size_t best_of(const npg_candidate *list, size_t count, size_t scored)
+/* The least of those that are better than the one by score, beyond chance. */
+static size_t least_of(const npg_candidate *list, size_t count, size_t scored)
 {
     size_t best = scored;
     for (size_t i = 0; i < count; i++) {
         if (!list[i].is_followed || i == scored) continue;
-        if (best == count || !list[best].is_followed || is_better(&list[i], &list[best])) best = i;
+        bool is_better = scored == count || !list[scored].is_followed ||
+                         npg_judged_better(&list[i].judgement, &list[scored].judgement);
+        bool is_least =
+            best == count || !list[best].is_followed || list[i].judgement.mean < list[best].judgement.mean;
+        if (is_better && is_least) best = i;
     }
     return best < count ? best : 0;
+}
+
+/* Parts that touch in one frame are joined in its surface, which is a handle more; none is ever joined too
+ * little.  So of those that points can't tell apart the one of fewest handles is taken. */
+static size_t best_of(const npg_candidate *list, size_t count, size_t scored)
+{
+    size_t least = least_of(list, count, scored), best = least;
+    for (size_t i = 0; i < count && list[least].is_followed; i++)
+        if (list[i].is_followed && list[i].handles < list[best].handles &&
+            !npg_judged_worse(&list[i].judgement, &list[least].judgement))
+            best = i;
+    return best;
 }
 
 npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count, size_t *best,
@@ -169,10 +177,10 @@ static void report_candidates(npg_worker *worker, const npg_candidate *list, siz
     json_t *of = json_array();
     for (size_t i = 0; i < count; i++)
         json_array_append_new(
-            of,
-            json_pack("{sI sb so sI sI}", "number", (json_int_t)list[i].number, "followed", list[i].is_followed,
-                      "judged", npg_json_real(list[i].is_followed ? list[i].judgement.mean : (double)NAN),
-                      "frames", (json_int_t)list[i].judgement.count, "handles", (json_int_t)list[i].handles));
+            of, json_pack("{sI sb so sI sI}", "number", (json_int_t)list[i].number, "followed",
+                          list[i].is_followed, "judged",
+                          npg_json_real(list[i].is_followed ? list[i].judgement.mean : (double)NAN), "frames",
+                          (json_int_t)list[i].judgement.count, "handles", (json_int_t)list[i].handles));
     json_object_set_new(npg_worker_report(worker), "candidates", of);
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }
