@@ -22,10 +22,12 @@
 /* By trial (tests/bed/decisions.md, "Normals"); widths in the cloud's spacing, or its noise. */
 #define CORE_MAX    8000 /* points that are dipoles: each step takes all their pairs */
 #define STEPS       16
+#define STEPS_GIVEN 8 /* where they begin near the end                                               */
 #define WIDTH_FIRST 1.2
 #define WIDTH_LAST  0.3
 #define WIDTH_NOISE 4.0 /* and no less than this many standard deviations of the noise */
-#define SHARE_LEAST 256 /* points that are worth a thread */
+#define ASKED       8   /* one in so many points says how far a step should go                       */
+#define SHARE_LEAST 256 /* points that are worth a thread                                            */
 
 typedef struct vectors { /* each coordinate by itself, as wide processors add */
     float *x, *y, *z;
@@ -99,8 +101,8 @@ typedef struct task {
     const field *f;
     const vectors *dipoles; /* number */
     enum { NUMBER, ADJOINT, OUTWARD } what;
-    const vectors *places; /* `count` of them */
-    size_t count, parts;
+    const vectors *places; /* `count` of them, each `stride` after the other */
+    size_t count, stride, parts;
     vectors out; /* number: x alone */
 } task;
 
@@ -110,7 +112,8 @@ static npg_status do_share(void *user, size_t part)
     const field *f = t->f;
     float soft = (float)(f->width * f->width), out[3] = {0};
     for (size_t i = part * t->count / t->parts; i < (part + 1) * t->count / t->parts; i++) {
-        const float p[3] = {t->places->x[i], t->places->y[i], t->places->z[i]};
+        size_t at = i * t->stride;
+        const float p[3] = {t->places->x[at], t->places->y[at], t->places->z[at]};
         if (t->what == NUMBER) {
             t->out.x[i] = sum_number(&f->at, t->dipoles, f->count, p, soft) / (4 * (float)M_PI);
             continue;
@@ -132,9 +135,11 @@ static npg_status do_all(task t)
     return npg_parallel(do_share, &t, t.parts);
 }
 
-static npg_status find_number(field *f, const vectors *dipoles)
+/* At every `stride`th point. */
+static npg_status find_number(field *f, const vectors *dipoles, size_t stride)
 {
-    return do_all((task){f, dipoles, NUMBER, &f->at, f->count, 0, {f->number, NULL, NULL}});
+    size_t count = (f->count + stride - 1) / stride;
+    return do_all((task){f, dipoles, NUMBER, &f->at, count, stride, 0, {f->number, NULL, NULL}});
 }
 
 /* ---- steps ---- */
@@ -143,9 +148,9 @@ static npg_status find_number(field *f, const vectors *dipoles)
 static npg_status advance(field *f)
 {
     double fits = 0, squares = 0;
-    NPG_TRY(find_number(f, &f->step));
-    for (size_t i = 0; i < f->count; i++) {
-        fits += (double)f->off[i] * (double)f->number[i];
+    NPG_TRY(find_number(f, &f->step, ASKED));
+    for (size_t i = 0; i * ASKED < f->count; i++) {
+        fits += (double)f->off[i * ASKED] * (double)f->number[i];
         squares += (double)f->number[i] * (double)f->number[i];
     }
     float by = squares > 0 ? (float)(fits / squares) : 0;
@@ -159,9 +164,9 @@ static npg_status advance(field *f)
 
 static npg_status step_to_half(field *f)
 {
-    NPG_TRY(find_number(f, &f->dipoles));
+    NPG_TRY(find_number(f, &f->dipoles, 1));
     for (size_t i = 0; i < f->count; i++) f->off[i] = 0.5f - f->number[i];
-    NPG_TRY(do_all((task){f, NULL, ADJOINT, &f->at, f->count, 0, f->step}));
+    NPG_TRY(do_all((task){f, NULL, ADJOINT, &f->at, f->count, 1, 0, f->step}));
     return advance(f);
 }
 
@@ -173,7 +178,7 @@ static float length_of(const vectors *v, size_t i)
 /* Each dipole against the gradient, as strong as it is. */
 static npg_status turn(field *f)
 {
-    NPG_TRY(do_all((task){f, NULL, OUTWARD, &f->at, f->count, 0, f->turned}));
+    NPG_TRY(do_all((task){f, NULL, OUTWARD, &f->at, f->count, 1, 0, f->turned}));
     for (size_t i = 0; i < f->count; i++) {
         float length = length_of(&f->turned, i), by = length > 0 ? length_of(&f->dipoles, i) / length : 0;
         f->dipoles.x[i] = by * f->turned.x[i];
@@ -224,11 +229,11 @@ static npg_status open_field(field *f, const frame_of *frame, const float *point
     return advance(f);
 }
 
-static npg_status settle(field *f, double noise)
+static npg_status settle(field *f, double noise, int steps)
 {
     double last = fmax(WIDTH_LAST, WIDTH_NOISE * noise), first = fmax(WIDTH_FIRST, 2 * last);
-    for (int k = 0; k < STEPS; k++) {
-        f->width = first + (last - first) * k / (STEPS - 1);
+    for (int k = 0; k < steps; k++) {
+        f->width = first + (last - first) * k / (steps - 1);
         NPG_TRY(step_to_half(f));
         NPG_TRY(turn(f));
     }
@@ -258,7 +263,7 @@ static npg_status read_field(float *normals, field *f, const frame_of *frame, co
     for (size_t first = 0; first < n; first += BATCH) {
         size_t count = n - first < BATCH ? n - first : BATCH;
         split(&places, points + 3 * first, count, frame->middle, frame->unit);
-        NPG_TRY(do_all((task){f, NULL, OUTWARD, &places, count, 0, out}));
+        NPG_TRY(do_all((task){f, NULL, OUTWARD, &places, count, 1, 0, out}));
         join(normals + 3 * first, &out, count);
     }
     return NPG_OK;
@@ -291,7 +296,7 @@ npg_status npg_winding_normals(float *normals, const float *points, const float 
     if (!status) npg_points_spread(core, core_given, count, points, given, n);
     if (!status) status = open_frame(&frame, &noise, core, count);
     if (!status) status = open_field(&f, &frame, core, core_given, count);
-    if (!status) status = settle(&f, noise);
+    if (!status) status = settle(&f, noise, given ? STEPS_GIVEN : STEPS);
     if (!status && count == n) join(normals, &f.dipoles, n);
     if (!status && count < n) status = read_field(normals, &f, &frame, points, n);
     npg_arena_release(&f.arena);
