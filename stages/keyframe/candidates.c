@@ -133,10 +133,13 @@ static size_t least_of(const npg_candidate *list, size_t count, size_t scored)
 static size_t best_of(const npg_candidate *list, size_t count, size_t scored)
 {
     size_t least = least_of(list, count, scored), best = least;
-    for (size_t i = 0; i < count && list[least].is_followed; i++)
-        if (list[i].is_followed && list[i].handles < list[best].handles &&
-            !npg_judged_worse(&list[i].judgement, &list[least].judgement))
-            best = i;
+    for (size_t i = 0; i < count && list[least].is_followed; i++) {
+        const npg_candidate *one = &list[i], *so_far = &list[best];
+        bool is_as_good = one->is_followed && !npg_judged_worse(&one->judgement, &list[least].judgement);
+        bool is_nearer =
+            best != least && one->handles == so_far->handles && one->judgement.mean < so_far->judgement.mean;
+        if (is_as_good && (one->handles < so_far->handles || is_nearer)) best = i;
+    }
     return best;
 }
 

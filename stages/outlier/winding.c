@@ -21,7 +21,7 @@
 
 /* By trial (tests/bed/decisions.md, "Normals"); widths in the cloud's spacing, or its noise. */
 #define CORE_MAX    8000 /* points that are dipoles: each step takes all their pairs */
-#define STEPS       16   /* half of them from given sides, which are near the end */
+#define STEPS       16
 #define WIDTH_FIRST 1.2
 #define WIDTH_LAST  0.3
 #define WIDTH_NOISE 4.0 /* and no less than this many standard deviations of the noise */
@@ -295,7 +295,7 @@ npg_status npg_winding_normals(float *normals, const float *points, const float 
     if (!status) npg_points_spread(core, core_given, count, points, given, n);
     if (!status) status = open_frame(&frame, &noise, core, count);
     if (!status) status = open_field(&f, &frame, core, core_given, count);
-    if (!status) status = settle(&f, noise, given ? STEPS / 2 : STEPS);
+    if (!status) status = settle(&f, noise, STEPS);
     if (!status && count == n) join(normals, &f.dipoles, n);
     if (!status && count < n) status = read_field(normals, &f, &frame, points, n);
     npg_arena_release(&f.arena);
