@@ -110,13 +110,6 @@ npg_status npg_follow_resume(npg_follow *follow, const npg_follow_place *place)
     return NPG_OK;
 }
 
-npg_status npg_follow_path(const npg_follow *follow, char path[NPG_PATH_SIZE], const char *name)
-{
-    NPG_TRY(npg_path_of(path, follow->folder, name));
-    if (strchr(name, '/')) return npg_error(NPG_BAD_INPUT, "%s: not a file of this folder", path);
-    return follow->settings.confine && npg_is_there(path) ? npg_path_confine(path, follow->folder) : NPG_OK;
-}
-
 /* ---- scanning the folder ---- */
 
 static bool is_frame_name(const npg_follow *follow, const char *name)

@@ -403,8 +403,8 @@ extern const npg_fact_kind npg_fact_frame_store;
  *
  *     OUT/job/frames.npg     one for every frame that came or is missing, in order of arrival
  *
- * With the points, where they came from standard input or were pushed, or repeat those of another frame; a frame of
- * a folder is its file's name, size and checksum.
+ * With the points of frames that were selected, or that a gap may repeat; of a folder with their path, which is not
+ * looked at again.
  *
  * Threads: stage ingest adds frames, any thread may look at them. */
 
@@ -412,11 +412,11 @@ typedef struct npg_spooled {
     int64_t number;
     int64_t index;       /* -1: it was not selected (option frames)                                   */
     int64_t digits;      /* npg_follow_digits() at the time                                           */
-    int64_t bytes;       /* of its file; of other frames the number of points; -1: not known          */
-    uint64_t hash;       /* XXH3 of the file, or of what came; means nothing where bytes is -1        */
+    int64_t points;      /* how many came; -1: the frame is missing                                   */
+    uint64_t hash;       /* XXH3 of what came                                                         */
     uint64_t key;        /* of this and all that came before                                          */
     uint32_t is_missing; /* no frame came with this number; it is skipped, or held                    */
-    uint32_t is_held, is_skipped, has_file;
+    uint32_t is_held, is_skipped, unused;
 } npg_spooled;
 
 /* A store, written by stage job where a live run keeps state. */

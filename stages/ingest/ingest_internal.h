@@ -228,9 +228,6 @@ typedef struct npg_follow_place {
 /* Before the first frame.  NPG_MEMORY. */
 npg_status npg_follow_resume(npg_follow *follow, const npg_follow_place *place);
 
-/* Path of a file of the folder.  With confine, NPG_BAD_INPUT for one that leads out. */
-npg_status npg_follow_path(const npg_follow *follow, char path[NPG_PATH_SIZE], const char *name);
-
 /* Files that are there now and were not taken. */
 npg_status npg_follow_count_new(npg_follow *follow, size_t *count);
 

@@ -3,7 +3,6 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 /* Frames of one gap.  Each becomes a frame of the run, so a number that is damaged or a time stamp must not
@@ -139,7 +138,7 @@ static npg_status refuse(const npg_live_source *live, int64_t number, const char
 
 static npg_status check_content(const npg_live_source *live, const npg_spooled *entry, const npg_frame *frame)
 {
-    bool is_same = entry->bytes == (int64_t)frame->point_count && entry->hash == npg_spool_hash(frame);
+    bool is_same = entry->points == (int64_t)frame->point_count && entry->hash == npg_spool_hash(frame);
     return is_same ? NPG_OK : refuse(live, entry->number, "is not the one it was");
 }
 
@@ -169,17 +168,6 @@ static npg_status next_frame(npg_live_source *live, npg_frame *frame)
 
 /* ---- the spool ---- */
 
-/* A file that has gone since it was read can't be compared later. */
-static npg_status describe_file(npg_spooled *entry, const char *path)
-{
-    struct stat info;
-    entry->bytes = -1;
-    if (entry->is_skipped || stat(path, &info)) return NPG_OK;
-    npg_status status = npg_hash_file(&entry->hash, path, UINT64_MAX);
-    if (!status) entry->bytes = (int64_t)info.st_size;
-    return status == NPG_MEMORY ? status : NPG_OK;
-}
-
 /* Where frame `index` is in the spool. */
 static npg_status note_place(npg_live_source *live, int64_t index, int64_t entry)
 {
@@ -194,24 +182,19 @@ static npg_status keep(npg_live_source *live, npg_frame *frame, bool is_missing,
 {
     npg_spooled entry = {.number = frame->number,
                          .index = is_chosen ? live->next : -1,
-                         .bytes = -1,
+                         .points = -1,
                          .key = live->key,
                          .is_missing = is_missing,
                          .is_held = frame->is_held,
-                         .is_skipped = frame->is_skipped,
-                         .has_file = live->follow && !is_missing};
+                         .is_skipped = frame->is_skipped};
     npg_status status = NPG_OK;
     frame->index = entry.index;
-    if (entry.has_file) {
-        entry.digits = (int64_t)npg_follow_digits(live->follow);
-        status = describe_file(&entry, frame->path);
-    } else if (!is_missing) {
-        entry.bytes = (int64_t)frame->point_count;
-        entry.hash = npg_spool_hash(frame);
-    }
+    if (live->follow) entry.digits = (int64_t)npg_follow_digits(live->follow);
+    if (!is_missing) entry.points = (int64_t)frame->point_count;
+    if (!is_missing) entry.hash = npg_spool_hash(frame);
     if (!status && (!live->own || live->next < live->settings.look_ahead)) {
         if (is_chosen) status = note_place(live, live->next, npg_spool_count(live->spool));
-        bool with_points = !entry.has_file && (is_chosen || holds(live));
+        bool with_points = is_chosen || holds(live);
         const char *cause = frame->is_skipped && !is_missing ? live->cause : NULL;
         if (!status) status = npg_spool_add(live->spool, &entry, frame, with_points, cause);
     }
@@ -387,21 +370,6 @@ static npg_status await(npg_live_source *live, int64_t index)
     return status;
 }
 
-/* The file that a frame of the folder had, where it is now. */
-static npg_status read_again(npg_live_source *live, npg_frame *frame, const npg_spooled *entry)
-{
-    char path[NPG_PATH_SIZE];
-    const char *slash = frame->path ? strrchr(frame->path, '/') : NULL;
-    npg_status status = npg_follow_path(live->follow, path, slash ? slash + 1 : "");
-    npg_release(&frame->path);
-    NPG_TRY(status);
-    if (entry->is_skipped) return npg_copy_text(&frame->path, path);
-    NPG_TRY(npg_read_cloud(frame, path, npg_own(live->worker, origin)));
-    frame->number = entry->number;
-    frame->index = entry->index;
-    return NPG_OK;
-}
-
 static npg_status from_spool(npg_live_source *live, npg_frame *frame, int64_t index)
 {
     npg_record *record;
@@ -409,7 +377,7 @@ static npg_status from_spool(npg_live_source *live, npg_frame *frame, int64_t in
     NPG_TRY(npg_spool_get(live->spool, live->entries[index], &entry, &record));
     npg_status status = npg_spool_frame(&entry, record, frame);
     npg_record_close(&record);
-    return status || !entry.has_file ? status : read_again(live, frame, &entry);
+    return status;
 }
 
 npg_status npg_live_source_read(npg_live_source *live, npg_frame *frame, int64_t index, bool is_last_use)
@@ -452,28 +420,6 @@ npg_status npg_live_source_end(npg_live_source *live)
 
 /* ---- a run that is resumed, or done ---- */
 
-/* A file that is gone matters where its points are needed once more. */
-static npg_status check_file(npg_live_source *live, const npg_spooled *entry, const npg_record *record,
-                             bool is_needed, size_t *gone)
-{
-    struct stat info;
-    uint64_t hash = 0;
-    char path[NPG_PATH_SIZE];
-    const char *name = npg_spool_path(record), *slash = name ? strrchr(name, '/') : NULL;
-    const char *what = NULL;
-    if (!slash) return npg_error(NPG_BAD_INPUT, "frame %lld has no file", (long long)entry->number);
-    if (entry->is_skipped || entry->bytes < 0) return NPG_OK;
-    NPG_TRY(npg_follow_path(live->follow, path, slash + 1));
-    bool is_there = !stat(path, &info);
-    if (is_there && info.st_size == entry->bytes) NPG_TRY(npg_hash_file(&hash, path, UINT64_MAX));
-    *gone += !is_there;
-    if (!is_there && is_needed) what = "missing";
-    if (is_there && hash != entry->hash) what = "not the one it was";
-    if (!what) return NPG_OK;
-    npg_error(NPG_USAGE, "the input %s is %s (frame %lld)", slash + 1, what, (long long)entry->number);
-    return npg_worker_refuse_job(live->worker);
-}
-
 /* The state may be older than what was said of the frame. */
 static void warn_again(npg_live_source *live, const npg_spooled *entry, const npg_record *record)
 {
@@ -499,7 +445,7 @@ static npg_status compare_streamed(npg_live_source *live, const npg_spooled *ent
 
 /* What the frame was is so still; and where the source stands behind it. */
 static npg_status pass_over(npg_live_source *live, const npg_spooled *entry, const npg_record *record,
-                            npg_follow_place *place, bool is_needed, size_t *gone)
+                            npg_follow_place *place, bool is_needed)
 {
     live->key = entry->key;
     live->seen++;
@@ -507,7 +453,6 @@ static npg_status pass_over(npg_live_source *live, const npg_spooled *entry, con
     if (is_needed) warn_again(live, entry, record);
     if (entry->index >= 0) NPG_TRY(note_place(live, entry->index, live->seen - 1));
     if (!entry->is_missing && live->stream) NPG_TRY(compare_streamed(live, entry));
-    if (entry->has_file && live->follow) NPG_TRY(check_file(live, entry, record, is_needed, gone));
     if (entry->index >= 0) live->next = entry->index + 1;
     live->previous.number = entry->number;
     if (entry->is_missing) return NPG_OK;
@@ -533,13 +478,7 @@ static npg_status stand_behind(npg_live_source *live, npg_follow_place *place)
         place->last = slash + 1;
         status = npg_follow_resume(live->follow, place);
     }
-    if (!status && holds(live) && entry.has_file && !entry.is_skipped) {
-        char now[NPG_PATH_SIZE];
-        status = npg_follow_path(live->follow, now, place->last);
-        if (!status) status = npg_read_cloud(previous, now, npg_own(live->worker, origin));
-    } else if (!status && holds(live) && !live->stream) {
-        status = npg_spool_frame(&entry, record, previous);
-    }
+    if (!status && holds(live) && !live->stream) status = npg_spool_frame(&entry, record, previous);
     npg_record_close(&record);
     previous->number = number;
     previous->is_skipped = entry.is_skipped;
@@ -556,7 +495,6 @@ static npg_status walk_again(npg_live_source *live, bool is_done)
 {
     const npg_facts *facts = npg_worker_facts(live->worker);
     npg_follow_place place = {0};
-    size_t gone = 0;
     live->came = npg_spool_count(live->spool);
     for (int64_t i = 0; i < live->came; i++) {
         npg_record *record;
@@ -566,15 +504,10 @@ static npg_status walk_again(npg_live_source *live, bool is_done)
             !is_done && entry.index >= 0 &&
             !npg_plan_is_read(&facts->plan, entry.index, facts->resumed_read, facts->frame_count);
         bool is_repeated = !is_done && holds(live) && i == live->came - 1;
-        npg_status status = pass_over(live, &entry, record, &place, is_needed || is_repeated, &gone);
+        npg_status status = pass_over(live, &entry, record, &place, is_needed || is_repeated);
         npg_record_close(&record);
         NPG_TRY(status);
     }
-    if (gone)
-        npg_worker_warn(live->worker, false, -1,
-                        "%zu files of frames that are solved are gone: whether they are those of then can't "
-                        "be compared",
-                        gone);
     return live->came ? stand_behind(live, &place) : NPG_OK;
 }
 

@@ -145,7 +145,7 @@ check_killed() {
     "$NEUPIG" run - -o other "${small[@]}" "${open[@]}" --overwrite <stream
 }
 
-@test "a changed option or file is named; a file that is gone matters where it is needed" {
+@test "a changed option is named; files of frames that came may change, or go" {
     local far=(--method '{"window": 4, "overlap": 2}' --look-ahead 12 --keyframe 9 --follow-end 0) # frame 0 is solved in window 4
     "$NEUPIG" run --follow all -o far "${small[@]}" "${far[@]}" >far.log
     cp -r capture/points changing
@@ -157,28 +157,9 @@ check_killed() {
     echo "$output"
     [ "$status" -eq 2 ]
     [[ "$output" == *'option epochs was "2" and is "3"'*--restart* ]]
-    for number in 0 9; do # one is not solved yet, the other is
-        file=frame_$(printf %04d $number).ply
-        mv changing/"$file" kept
-        cp changing/frame_0003.ply changing/"$file"
-        run "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}"
-        echo "$output"
-        [ "$status" -eq 2 ]
-        [[ "$output" == *"the input $file is not the one it was (frame $number)"*--restart* ]]
-        mv kept changing/"$file"
-    done
-    mv changing/frame_0000.ply kept
-    run "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}"
-    [ "$status" -eq 2 ]
-    [[ "$output" == *"the input frame_0000.ply is missing (frame 0)"* ]]
-    mv kept changing/frame_0000.ply
+    cp changing/frame_0003.ply changing/frame_0000.ply
     rm changing/frame_0009.ply
-    touch changing/*
-    mv changing moved # the same files elsewhere, and another end
-    run "$NEUPIG" run --follow moved -o change "${small[@]}" "${far[@]}" --follow-end 9
-    echo "$output"
-    [ "$status" -eq 0 ]
-    [[ "$output" == *"1 files of frames that are solved are gone"* ]]
+    "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" --follow-end 9
     same far change
 }
 
@@ -193,10 +174,6 @@ check_killed() {
     run "$NEUPIG" run --follow later -o finished "${small[@]}" "${open[@]}"
     [ "$status" -eq 2 ]
     [[ "$output" == *"is done, but 1 files came since"*--restart* ]]
-    cp all/frame_0004.ply later/frame_0003.ply
-    run "$NEUPIG" run --follow later -o finished "${small[@]}" "${open[@]}"
-    [ "$status" -eq 2 ]
-    [[ "$output" == *"frame_0003.ply is not the one it was"* ]]
     run "$NEUPIG" append finished
     [ "$status" -eq 2 ]
     [[ "$output" == *"not to one of a live source"* ]]
