@@ -23,7 +23,6 @@ npg_status npg_adam_open(npg_adam *adam, npg_device *device, const float *rates,
 
 void npg_adam_close(npg_adam *adam)
 {
-    npg_program_close(&adam->program);
     npg_buffer_close(&adam->first);
     npg_buffer_close(&adam->second);
     npg_buffer_close(&adam->rate);

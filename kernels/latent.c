@@ -97,7 +97,6 @@ npg_status npg_latent_open(npg_latent *latent, npg_device *device, const npg_sam
 
 void npg_latent_close(npg_latent *latent)
 {
-    npg_program_close(&latent->program);
     npg_buffer_close(&latent->index);
     npg_buffer_close(&latent->weight);
     npg_buffer_close(&latent->start);

@@ -53,16 +53,15 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
 {
     const size_t f = sizeof(float);
     const npg_mlp_shape *s = &m->shape;
-    size_t block = m->rows / m->blocks, kept = m->batch ? m->batch * m->rows : m->groups * block;
+    size_t block = m->rows / m->blocks;
     NPG_TRY(npg_buffer_open(&m->params, d, npg_mlp_param_count(s) * f));
     NPG_TRY(npg_buffer_open(&m->code, d, m->frames * s->code_size * f));
     NPG_TRY(npg_buffer_open(&m->z, d, m->rows * CHANNELS * f));
     NPG_TRY(npg_buffer_open(&m->out, d, m->frames * m->rows * NPG_MLP_OUT * f));
     NPG_TRY(npg_buffer_open(&m->p, d, m->rows * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->c, d, m->frames * s->w1 * f));
-    NPG_TRY(npg_buffer_open(&m->h2, d, kept * s->w2 * f));
+    NPG_TRY(npg_buffer_open(&m->h2, d, m->batch * m->rows * s->w2 * f));
     NPG_TRY(npg_buffer_open(&m->scratch, d, m->groups * npg_mlp_scratch(s, block) * f));
-    if (!m->batch) return NPG_OK;
     NPG_TRY(npg_buffer_open(&m->grad, d, npg_mlp_param_count(s) * f));
     NPG_TRY(npg_buffer_open(&m->dz, d, m->rows * CHANNELS * f));
     NPG_TRY(npg_buffer_open(&m->dout, d, m->frames * m->rows * NPG_MLP_OUT * f));
@@ -85,7 +84,7 @@ npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *s
     char constants[128];
     const npg_tuning *tuning = npg_device_tuning(device);
     const size_t block = (size_t)tuning->mlp_rows;
-    NPG_REQUIRE(rows && rows % block == 0 && frames && shape->w1 % NPG_PANEL == 0 &&
+    NPG_REQUIRE(rows && rows % block == 0 && frames && batch && shape->w1 % NPG_PANEL == 0 &&
                 shape->w2 % NPG_PANEL == 0);
     NPG_REQUIRE(shape->w1 >= NPG_PANEL && shape->w2 >= NPG_PANEL);
     *mlp = (npg_mlp){.shape = *shape, .rows = rows, .blocks = rows / block, .frames = frames, .batch = batch};
@@ -108,8 +107,6 @@ void npg_mlp_close(npg_mlp *mlp)
                          &mlp->out,    &mlp->dout, &mlp->p,    &mlp->dp,      &mlp->c,
                          &mlp->dc,     &mlp->h2,   &mlp->sums, &mlp->scratch, &mlp->transposed};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_buffer_close(all[i]);
-    npg_program_close(&mlp->program);
-    npg_program_close(&mlp->time);
 }
 
 npg_status npg_mlp_begin(npg_mlp *m)
@@ -120,7 +117,6 @@ npg_status npg_mlp_begin(npg_mlp *m)
                        NPG_INT(m->shape.w1), NPG_INT(m->frames)));
     NPG_TRY(NPG_LAUNCH_GROUPS(m->program, "mlp_input", m->groups, m->local, NPG_BUF(&m->p), NPG_BUF(&m->z),
                               NPG_BUF(&m->params), NPG_INT(m->blocks)));
-    if (!m->batch) return NPG_OK;
     NPG_TRY(npg_buffer_zero(&m->sums));
     NPG_TRY(npg_buffer_zero(&m->dc));
     NPG_TRY(npg_buffer_zero(&m->dp));
@@ -132,8 +128,7 @@ npg_status npg_mlp_forward(npg_mlp *m, size_t first, size_t count)
 {
     return NPG_LAUNCH_GROUPS(m->program, "mlp_forward", m->groups, m->local, NPG_BUF(&m->out),
                              NPG_BUF(&m->h2), NPG_BUF(&m->p), NPG_BUF(&m->c), NPG_BUF(&m->params),
-                             NPG_BUF(&m->scratch), NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first),
-                             NPG_INT(m->batch > 0));
+                             NPG_BUF(&m->scratch), NPG_INT(m->blocks), NPG_INT(count), NPG_INT(first));
 }
 
 npg_status npg_mlp_backward(npg_mlp *m, size_t first, size_t count)

@@ -190,16 +190,16 @@ inline void head_layer(global float *out, global const float *h2, global const f
 }
 
 /* For the frames first_frame ...: out [all frames][blocks * ROWS][8] and, for the backward pass,
- * h2 [frames][blocks][W2 panels]; with keep = 0 h2 is not kept and has room for G blocks.  c: [all frames][W1].  scratch: [G][SCRATCH].  Global size: G groups. */
+ * h2 [frames][blocks][W2 panels].  c: [all frames][W1].  scratch: [G][SCRATCH].  Global size: G groups. */
 GROUP_KERNEL mlp_forward(global float *out, global float *h2, global const float *p, global const float *c,
                          global const float *params, global float *scratch, int blocks, int frames,
-                         int first_frame, int keep)
+                         int first_frame)
 {
     size_t group = get_group_id(0);
     global float *h1 = scratch + group * SCRATCH;
     for (int item = group; item < blocks * frames; item += get_num_groups(0)) {
         size_t frame = item / blocks, block = item % blocks;
-        global float *mine = h2 + (keep ? frame * blocks + block : group) * BLOCK(W2);
+        global float *mine = h2 + (frame * blocks + block) * BLOCK(W2);
         first_layer(h1, p + block * BLOCK(W1), c + (first_frame + frame) * W1);
         SYNC
         second_layer(mine, h1, params, params + AT_B2);

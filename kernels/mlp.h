@@ -51,7 +51,7 @@ size_t npg_mlp_rows(const npg_device *device, size_t vertices);
 size_t npg_mlp_scratch(const npg_mlp_shape *shape, size_t block);
 
 /* rows: from npg_mlp_rows; frames: T; batch: frames whose second hidden layer is kept between forward and
- * backward (0: forward only).  Device memory in bytes: about 4 (rows (2 W1 + batch W2) + groups W1 W2). */
+ * backward.  Device memory in bytes: about 4 (rows (2 W1 + batch W2) + groups W1 W2). */
 npg_status npg_mlp_open(npg_mlp *mlp, npg_device *device, const npg_mlp_shape *shape, size_t rows,
                         size_t frames, size_t batch);
 void npg_mlp_close(npg_mlp *mlp);

@@ -245,10 +245,6 @@ void npg_motion_close(npg_motion *m)
                          &m->forward,   &m->reverse,     &m->start,     &m->neighbour,
                          &m->edge_rest, &m->cd,          &m->part,      &m->gain};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_buffer_close(all[i]);
-    npg_program_close(&m->transform);
-    npg_program_close(&m->nearest);
-    npg_program_close(&m->chamfer);
-    npg_program_close(&m->isometry);
 }
 
 /* ---- steps ---- */

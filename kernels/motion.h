@@ -3,15 +3,11 @@
 #ifndef NPG_MOTION_H
 #define NPG_MOTION_H
 
+#include "kernels/kernels.h"
 #include "kernels/layout.h"
-#include "kernels/runtime/device.h"
 
 /* count x 3 -> blocks, padded to `padded` points (a multiple of 16) by repeating the last. */
 void npg_pack16(float *out, const float *points, size_t count, size_t padded);
-
-/* Order of points along a Morton curve of their own box: order[i] is the index of the i-th.
- * Points are finite. */
-npg_status npg_morton_order(uint32_t *order, const float *points, size_t count);
 
 /* Box blocks of the tree over `count` points. */
 size_t npg_tree_blocks(size_t count);

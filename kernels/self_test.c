@@ -1,4 +1,4 @@
-/* Kernels: the self-test, one epoch of a small fit of made-up numbers.  Each op hands its result to the next, so
+/* Self-test: one epoch of a small fit of made-up numbers.  Each op hands its result to the next, so
  * the first that is off is the one that is wrong. */
 #include "kernels/kernels.h"
 

@@ -93,7 +93,6 @@ npg_status npg_sobolev_open(npg_sobolev *sobolev, npg_device *device, const npg_
 
 void npg_sobolev_close(npg_sobolev *sobolev)
 {
-    npg_program_close(&sobolev->program);
     npg_buffer_close(&sobolev->levels);
     npg_buffer_close(&sobolev->matrices);
     npg_buffer_close(&sobolev->eigen);

@@ -1,4 +1,4 @@
-/* Memory: aligned, zeroed, counted by purpose, from the user's allocator;
+/* Memory: aligned, zeroed, counted, from the user's allocator;
  * the n-th request can be made to fail. */
 #include "pipeline/memory.h"
 
@@ -31,7 +31,6 @@ static void default_release(void *user, void *memory)
 }
 
 static npg_allocator allocator = {sizeof(npg_allocator), NULL, default_alloc, default_release};
-static _Atomic size_t used[NPG_PURPOSES];
 static _Atomic size_t used_all, peak_all, limit_all;
 static _Atomic uint64_t requests, fail_at;
 static _Atomic bool fail_from_then_on;
@@ -61,16 +60,12 @@ size_t npg_memory_peak(void)
 {
     return atomic_load(&peak_all);
 }
-size_t npg_memory_used_for(npg_purpose purpose)
-{
-    return atomic_load(&used[purpose]);
-}
 void npg_memory_set_limit(size_t bytes)
 {
     atomic_store(&limit_all, bytes);
 }
 
-const char *npg_purpose_name(npg_purpose purpose)
+static const char *name_of(npg_purpose purpose)
 {
     static const char *const names[NPG_PURPOSES] = {"frames", "mesh",  "fit", "device",
                                                     "query",  "files", "run"};
@@ -97,9 +92,8 @@ npg_status npg_memory_count(npg_purpose purpose, ptrdiff_t bytes)
         atomic_fetch_sub(&used_all, change);
         return npg_error(NPG_MEMORY,
                          "%td more bytes for %s would pass the memory limit of %zu MiB (%zu in use)", bytes,
-                         npg_purpose_name(purpose), limit >> 20, (now - change) >> 20);
+                         name_of(purpose), limit >> 20, (now - change) >> 20);
     }
-    atomic_fetch_add(&used[purpose], change);
     size_t peak = atomic_load(&peak_all);
     while (now > peak && bytes > 0 && !atomic_compare_exchange_weak(&peak_all, &peak, now)) {
     }
@@ -112,12 +106,12 @@ npg_status npg_alloc(void *out, npg_purpose purpose, size_t size)
     *result = NULL;
     if (!size) return NPG_OK;
     if (must_fail() || size > PTRDIFF_MAX - 2 * ALIGN)
-        return npg_error(NPG_MEMORY, "no memory: %zu bytes for %s", size, npg_purpose_name(purpose));
+        return npg_error(NPG_MEMORY, "no memory: %zu bytes for %s", size, name_of(purpose));
     NPG_TRY(npg_memory_count(purpose, (ptrdiff_t)size));
     unsigned char *block = allocator.alloc(allocator.user, ALIGN, size + ALIGN);
     if (!block) {
         npg_memory_count(purpose, -(ptrdiff_t)size);
-        return npg_error(NPG_MEMORY, "no memory: %zu bytes for %s", size, npg_purpose_name(purpose));
+        return npg_error(NPG_MEMORY, "no memory: %zu bytes for %s", size, name_of(purpose));
     }
     memset(block, 0, size + ALIGN);
     *(head *)(void *)block = (head){.size = size, .purpose = purpose};
@@ -129,8 +123,7 @@ npg_status npg_alloc_array(void *out, npg_purpose purpose, size_t count, size_t 
 {
     *(void **)out = NULL;
     if (size && count > SIZE_MAX / size)
-        return npg_error(NPG_MEMORY, "no memory: %zu x %zu bytes for %s", count, size,
-                         npg_purpose_name(purpose));
+        return npg_error(NPG_MEMORY, "no memory: %zu x %zu bytes for %s", count, size, name_of(purpose));
     return npg_alloc(out, purpose, count * size);
 }
 

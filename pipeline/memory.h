@@ -1,4 +1,4 @@
-/* Memory: aligned, zeroed, counted by purpose, from the user's allocator;
+/* Memory: aligned, zeroed, counted, from the user's allocator;
  * the n-th request can be made to fail.
  *
  * Threads: all functions may be called from any thread; the counters are atomic. */
@@ -13,15 +13,15 @@
 extern "C" {
 #endif
 
-typedef enum npg_purpose {
-    NPG_FOR_FRAMES, /* points, normals and vertices of the frames in flight */
-    NPG_FOR_MESH,   /* reference mesh and what is derived from it           */
-    NPG_FOR_FIT,    /* the optimisation, host side                          */
-    NPG_FOR_DEVICE, /* device buffers                                       */
-    NPG_FOR_QUERY,  /* search structures                                    */
-    NPG_FOR_FILES,  /* readers, writers, lists of names                     */
-    NPG_FOR_RUN,    /* everything small                                     */
-    NPG_PURPOSES
+typedef enum npg_purpose {                 /* what the message of a refusal names */
+                           NPG_FOR_FRAMES, /* points, normals and vertices of the frames in flight */
+                           NPG_FOR_MESH,   /* reference mesh and what is derived from it           */
+                           NPG_FOR_FIT,    /* the optimisation, host side                          */
+                           NPG_FOR_DEVICE, /* device buffers                                       */
+                           NPG_FOR_QUERY,  /* search structures                                    */
+                           NPG_FOR_FILES,  /* readers, writers, lists of names                     */
+                           NPG_FOR_RUN,    /* everything small                                     */
+                           NPG_PURPOSES
 } npg_purpose;
 
 /* size bytes, all zero, aligned to 64; *out is NULL on failure.  size 0 gives NULL and NPG_OK.
@@ -75,9 +75,6 @@ void npg_object_close(void *object);
 /* Count bytes that another library holds for us; negative gives them back.  NPG_MEMORY when the limit is
  * passed (the count is then unchanged). */
 npg_status npg_memory_count(npg_purpose purpose, ptrdiff_t bytes);
-
-size_t npg_memory_used_for(npg_purpose purpose);
-const char *npg_purpose_name(npg_purpose purpose);
 
 /* No more than this many bytes in use (0: no limit). */
 void npg_memory_set_limit(size_t bytes);

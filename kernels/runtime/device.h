@@ -58,11 +58,10 @@ npg_status npg_buffer_zero(npg_buffer *buffer);
 npg_status npg_buffer_from(npg_buffer *buffer, npg_device *device, const void *data, size_t size);
 
 /* Build kernels/<name>.cl with the given build constants ("-DW1=512 ...", may be "") and those of the tuning.
- * The device owns the program; the same text and constants opened twice are the same one, and lasts until the
+ * The device owns the program; the same text and constants opened twice are the same one, which lasts until the
  * device is closed. */
 npg_status npg_program_open(npg_program **program, npg_device *device, const char *name,
                             const char *constants);
-void npg_program_close(npg_program **program);
 
 /* One argument of a kernel. */
 typedef struct npg_argument {

@@ -107,11 +107,6 @@ npg_status npg_program_open(npg_program **out, npg_device *device, const char *n
     return status;
 }
 
-void npg_program_close(npg_program **slot)
-{
-    if (slot) *slot = NULL;
-}
-
 void npg_programs_close(npg_device *device)
 {
     while (device->programs) {

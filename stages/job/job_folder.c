@@ -26,16 +26,12 @@ static bool is_kept(const npg_job *job, int64_t serial)
            (serial == job->serial || serial == job->serial - 1 || serial == job->forward_serial);
 }
 
-/* Grids of states that went, unless they are to be exported, and grids that were not finished; and what
- * versions before the store left. */
+/* Grids of states that went, unless they are kept for all, and grids that were not finished. */
 static bool is_stale(const npg_job *job, const char *name)
 {
-    static const char *const older[] = {"motion_", "poses.", "followed_", "inside."};
     bool is_hidden = name[0] == '.';
     long long serial;
     name += is_hidden;
-    for (size_t i = 0; i < sizeof older / sizeof *older; i++)
-        if (!strncmp(name, older[i], strlen(older[i]))) return true;
     if (sscanf(name, "window_%lld.", &serial) != 1) return false;
     return is_hidden || !strstr(name, ".vdb") || !(job->keeps_grids || is_kept(job, serial));
 }

@@ -232,7 +232,7 @@ static void every_failed_allocation_is_said_and_leaves_nothing(void **state)
 {
     (void)state;
     scatter();
-    size_t before = npg_memory_used_for(NPG_FOR_MESH);
+    size_t before = npg_memory_used();
     npg_status status = NPG_MEMORY;
     uint64_t n = 0;
     while (status == NPG_MEMORY && n < 100) {
@@ -241,7 +241,7 @@ static void every_failed_allocation_is_said_and_leaves_nothing(void **state)
         status = npg_attach_open(&t, ball, points, normals, N);
         npg_memory_fail_at(0, false);
         npg_attach_close(&t);
-        assert_int_equal(npg_memory_used_for(NPG_FOR_MESH), before);
+        assert_int_equal(npg_memory_used(), before);
     }
     assert_int_equal(status, NPG_OK);
     assert_true(n > 5);

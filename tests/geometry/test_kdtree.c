@@ -144,7 +144,7 @@ static void memory_runs_out_without_harm(void **state)
         assert_true(!status == !!tree);
         npg_kdtree_close(&tree);
     }
-    assert_int_equal(npg_memory_used_for(NPG_FOR_QUERY), 0);
+    assert_int_equal(npg_memory_used(), 0);
 }
 
 int main(void)

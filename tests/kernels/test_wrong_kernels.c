@@ -119,7 +119,6 @@ static void a_binary_in_the_cache_belongs_to_its_text(void **state)
     spoil(&changes[sizeof changes / sizeof *changes - 1]);
     if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
     assert_int_equal(npg_program_open(&program, device, "isometry", ""), NPG_OK);
-    npg_program_close(&program);
     mend_all();
     npg_device_close(&device);
     if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());

@@ -29,7 +29,6 @@ static void blocks_are_aligned_zero_and_counted(void **state)
         assert_int_equal((uintptr_t)block % 64, 0);
         for (size_t i = 0; i < size; i++) assert_int_equal(block[i], 0);
         memset(block, 0xff, size);
-        assert_int_equal(npg_memory_used_for(NPG_FOR_MESH), size);
         assert_int_equal(npg_memory_used(), size);
         assert_true(npg_memory_peak() >= size);
         npg_release(&block);
@@ -73,7 +72,6 @@ static void the_limit_holds(void **state)
     assert_int_equal(npg_memory_count(NPG_FOR_DEVICE, 2 << 20), NPG_MEMORY);
     assert_int_equal(npg_memory_used(), 2 << 20);
     assert_int_equal(npg_memory_count(NPG_FOR_DEVICE, 1 << 20), NPG_OK);
-    assert_int_equal(npg_memory_used_for(NPG_FOR_DEVICE), 1 << 20);
     assert_int_equal(npg_memory_count(NPG_FOR_DEVICE, -(1 << 20)), NPG_OK);
     npg_release(&a);
 }
@@ -127,7 +125,7 @@ static void an_arena_frees_all_at_once(void **state)
     assert_memory_equal(copy, numbers, 1000 * sizeof *copy);
     assert_string_equal(npg_arena_text(&arena, "walker"), "walker");
     assert_int_equal(npg_arena_status(&arena), NPG_OK);
-    assert_int_equal(npg_memory_used_for(NPG_FOR_MESH), 8007);
+    assert_int_equal(npg_memory_used(), 8007);
     npg_arena_release(&arena);
     assert_int_equal(npg_memory_used(), 0);
     npg_arena_release(&arena); /* an empty one, too */
@@ -184,7 +182,7 @@ static void an_object_goes_with_its_arena(void **state)
     } * thing;
     assert_int_equal(npg_object_open(&thing, NPG_FOR_FILES, sizeof *thing), NPG_OK);
     thing->name = npg_arena_text(&thing->arena, "walker");
-    assert_int_equal(npg_memory_used_for(NPG_FOR_FILES), sizeof *thing + 7);
+    assert_int_equal(npg_memory_used(), sizeof *thing + 7);
     npg_object_close(&thing);
     assert_null(thing);
     npg_object_close(&thing);
@@ -251,7 +249,7 @@ static void counters_survive_threads(void **state)
         pthread_join(threads[i], &failed);
         assert_null(failed);
     }
-    assert_int_equal(npg_memory_used_for(NPG_FOR_QUERY), 0);
+    assert_int_equal(npg_memory_used(), 0);
 }
 
 int main(void)

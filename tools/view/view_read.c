@@ -9,6 +9,7 @@
 
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
+#include "kernels/kernels.h"
 #include "pipeline/file.h"
 
 /* ---- the mesh ---- */
@@ -136,56 +137,21 @@ npg_status npg_view_measure(npg_view_frames *frames, int32_t *errors)
 
 /* ---- the points that are shown ---- */
 
-typedef struct placed {
-    uint64_t code;
-    float at[3];
-} placed;
-
-/* 21 bits apart by two. */
-static uint64_t spread_bits(uint64_t bits)
-{
-    bits = (bits | bits << 32) & 0x1f00000000ffff;
-    bits = (bits | bits << 16) & 0x1f0000ff0000ff;
-    bits = (bits | bits << 8) & 0x100f00f00f00f00f;
-    bits = (bits | bits << 4) & 0x10c30c30c30c30c3;
-    return (bits | bits << 2) & 0x1249249249249249;
-}
-
-static uint64_t code_of(const float *p, const npg_bounds *bounds, double longest)
-{
-    uint64_t code = 0;
-    for (int a = 0; a < 3; a++) {
-        double share = longest > 0 ? ((double)p[a] - bounds->lo[a]) / longest : 0;
-        code |= spread_bits((uint64_t)(share * 0x1fffff)) << a;
-    }
-    return code;
-}
-
-static int by_code(const void *left, const void *right)
-{
-    const placed *a = left, *b = right;
-    return (a->code > b->code) - (a->code < b->code);
-}
-
 npg_status npg_view_choose_points(npg_view_frames *frames, size_t *count)
 {
-    placed *order = NULL;
+    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
     size_t limit = frames->point_limit;
-    npg_bounds bounds = npg_bounds_empty();
     *count = frames->point_count < limit ? frames->point_count : limit;
     if (!*count) return NPG_OK;
     NPG_TRY(npg_arena_grow(&frames->arena, &frames->some, &frames->some_capacity, *count,
                            3 * sizeof *frames->some));
-    NPG_TRY(npg_alloc_array(&order, NPG_FOR_FRAMES, *count, sizeof *order));
-    *count = npg_points_spread(frames->some, NULL, *count, frames->points, NULL, frames->point_count);
-    npg_bounds_add_points(&bounds, frames->some, *count);
-    double longest = npg_bounds_longest(&bounds);
-    for (size_t i = 0; i < *count; i++) {
-        const float *p = frames->some + 3 * i;
-        order[i] = (placed){code_of(p, &bounds, longest), {p[0], p[1], p[2]}};
-    }
-    qsort(order, *count, sizeof *order, by_code);
-    for (size_t i = 0; i < *count; i++) memcpy(frames->some + 3 * i, order[i].at, sizeof order[i].at);
-    npg_release(&order);
-    return NPG_OK;
+    float *spread = npg_arena_take(&scratch, *count, 3 * sizeof *spread);
+    uint32_t *order = npg_arena_take(&scratch, *count, sizeof *order);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) *count = npg_points_spread(spread, NULL, *count, frames->points, NULL, frames->point_count);
+    if (!status) status = npg_morton_order(order, spread, *count);
+    for (size_t i = 0; i < *count && !status; i++)
+        memcpy(frames->some + 3 * i, spread + 3 * (size_t)order[i], 3 * sizeof *spread);
+    npg_arena_release(&scratch);
+    return status;
 }

@@ -243,13 +243,10 @@ typedef struct npg_zip {
     npg_file *file;          /* a loan */
     npg_zip_member *members; /* a loan */
     size_t count;
-    uint64_t large; /* numbers from here on take ZIP64 records: NPG_ZIP_LARGE but in tests */
 } npg_zip;
 
-#define NPG_ZIP_LARGE UINT64_C(0xffffffff)
-
 /* Begin an open file: names and sizes of all members are set.  The last one is the longest for speed. */
-npg_status npg_zip_open(npg_zip *zip, npg_file *file, npg_zip_member *members, size_t count, uint64_t large);
+npg_status npg_zip_open(npg_zip *zip, npg_file *file, npg_zip_member *members, size_t count);
 
 /* The next bytes of a member.  Those of the last one go straight to the end of the file. */
 npg_status npg_zip_put(npg_zip *zip, size_t member, const void *data, size_t size);

@@ -162,7 +162,7 @@ static npg_status open_npz(void *state)
         snprintf(member->name, sizeof member->name, "%s.npy", a.name);
         member->size = HEADER + data_bytes(&a);
     }
-    NPG_TRY(npg_zip_open(&s->zip, s->writer.file, s->members, s->member_count, NPG_ZIP_LARGE));
+    NPG_TRY(npg_zip_open(&s->zip, s->writer.file, s->members, s->member_count));
     for (int i = 0; i < ARRAYS; i++)
         if (s->at[i] >= 0) NPG_TRY(put_header(s, i));
     return put_fixed(s);
