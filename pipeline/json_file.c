@@ -30,32 +30,6 @@ static void blank_comments(char *text)
     }
 }
 
-/* The whole file and a closing zero; takes memory only as the bytes come in. */
-static npg_status read_all(char **text, FILE *file, const char *path, size_t limit)
-{
-    size_t capacity = 0, size = 0, got = 1;
-    while (got) {
-        NPG_TRY(npg_grow(text, &capacity, size + 4096, 1, NPG_FOR_FILES));
-        got = fread(*text + size, 1, capacity - size - 1, file);
-        size += got;
-        if (ferror(file)) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
-        if (size > limit) return npg_error(NPG_USAGE, "%s: larger than %zu MiB", path, limit >> 20);
-    }
-    (*text)[size] = 0;
-    return NPG_OK;
-}
-
-static npg_status read_text(char **text, const char *path, size_t limit)
-{
-    *text = NULL;
-    FILE *file = fopen(path, "rb");
-    if (!file) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
-    npg_status status = read_all(text, file, path, limit);
-    fclose(file);
-    if (status) npg_release(text);
-    return status;
-}
-
 npg_status npg_json_parse(json_t **root, char *text, const char *place)
 {
     json_error_t error;
@@ -65,12 +39,21 @@ npg_status npg_json_parse(json_t **root, char *text, const char *place)
     return npg_error(NPG_USAGE, "%s:%d:%d: %s", place, error.line, error.column, error.text);
 }
 
-npg_status npg_json_read(json_t **root, char **text, const char *path, size_t limit)
+npg_status npg_json_read(json_t **root, const char *path, size_t limit)
 {
+    struct stat info;
+    size_t room = 0;
+    char nothing[] = "", *text = NULL;
     *root = NULL;
-    NPG_TRY(read_text(text, path, limit));
-    npg_status status = npg_json_parse(root, *text, path);
-    if (status) npg_release(text);
+    FILE *file = fopen(path, "rb");
+    bool is_read = file && !fstat(fileno(file), &info);
+    bool is_large = is_read && (size_t)info.st_size > limit;
+    if (is_read && !is_large) is_read = getdelim(&text, &room, 0, file) >= 0 || !ferror(file);
+    npg_status status = is_large   ? npg_error(NPG_USAGE, "%s: larger than %zu MiB", path, limit >> 20)
+                        : !is_read ? npg_error(NPG_USAGE, "%s: %s", path, strerror(errno))
+                                   : npg_json_parse(root, text ? text : nothing, path);
+    if (file) fclose(file);
+    free(text);
     return status;
 }
 

@@ -10,9 +10,8 @@
 #include "pipeline/file.h"
 
 /* Parse a file of at most `limit` bytes; comments go from // to the end of the line, a key may stand only
- * once.  *text gets what was parsed, comments blanked out, lines as they were: npg_release().  The caller
- * owns the root (json_decref).  NPG_USAGE names the file, line, column and cause; both are then NULL. */
-npg_status npg_json_read(json_t **root, char **text, const char *path, size_t limit);
+ * once.  The caller owns the root (json_decref).  NPG_USAGE names the file, line, column and cause; it is then NULL. */
+npg_status npg_json_read(json_t **root, const char *path, size_t limit);
 
 /* The same for a text at hand, whose comments are blanked out in place; errors name it as `place`. */
 npg_status npg_json_parse(json_t **root, char *text, const char *place);

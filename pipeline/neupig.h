@@ -144,7 +144,7 @@ NPG_API void npg_options_close(npg_options **options);
  * "bars.coverage". */
 NPG_API npg_status npg_options_set(npg_options *options, const char *name, const char *value);
 
-/* The method in a file; // comments are allowed.  NPG_USAGE names file, line and option. */
+/* The method in a file; // comments are allowed.  NPG_USAGE names file and option. */
 NPG_API npg_status npg_options_load(npg_options *options, const char *path);
 
 /* The options that the job in the folder was begun with, its input and its output:

@@ -210,7 +210,7 @@ CONFIG
     small=(--faces 200 --method '{"poisson-depth": 5}' --bars residual=100,flipped=100,stretched=100,coverage=0 --keyframe 1)
     run "$NEUPIG" batch ama -o results --method fit.json "${small[@]}" --task-count 2
     [ "$status" -eq 2 ]
-    [[ "$output" == *'fit.json:1: '*'tools/method_json.py'* ]]
+    [[ "$output" == *'fit.json: '*'tools/method_json.py'* ]]
     "$BATS_TEST_DIRNAME/../../tools/method_json.py" fit.json >method.json 2>ignored
     [ "$(cat ignored)" = 'no counterpart, so without effect: rotation_method, grid.neighbours, grid.solver, mlp.layers' ]
     run "$NEUPIG" batch ama -o results --method method.json "${small[@]}" --task-count 2

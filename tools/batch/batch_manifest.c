@@ -212,15 +212,13 @@ npg_status npg_batch_read_manifest(npg_batch *batch, const npg_batch_given *give
 {
     manifest m = {.batch = batch, .given = given};
     json_t *root;
-    char *text;
     const char *slash = strrchr(batch->path, '/');
     m.folder = npg_arena_text(&batch->arena, slash ? batch->path : ".");
     NPG_TRY(npg_arena_status(&batch->arena));
     if (slash) m.folder[slash == batch->path ? 1 : slash - batch->path] = 0;
-    NPG_TRY(npg_json_read(&root, &text, batch->path, MANIFEST_LIMIT));
+    NPG_TRY(npg_json_read(&root, batch->path, MANIFEST_LIMIT));
     npg_status status = npg_error_prefix(read_all(&m, root), "%s", batch->path);
     npg_options_close(&m.base.options);
-    npg_release(&text);
     json_decref(root);
     return status;
 }

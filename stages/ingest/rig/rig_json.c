@@ -334,23 +334,15 @@ static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)
     return NPG_OK;
 }
 
-/* npg_json_read() with the status of data, not of a command line. */
-static npg_status read_json(json_t **root, char **text, const char *path)
-{
-    npg_status status = npg_json_read(root, text, path, NPG_RIG_TEXT_MAX);
-    return status == NPG_USAGE ? npg_error_restore(NPG_BAD_INPUT, npg_error_text()) : status;
-}
-
 npg_status npg_rig_load_json(npg_rig *rig)
 {
     json_t *root;
-    char *text, *file = npg_rig_ends_with(rig->path, ".json")
-                            ? rig->path
-                            : npg_arena_path(&rig->arena, rig->path, "rig.json");
+    char *file = npg_rig_ends_with(rig->path, ".json") ? rig->path
+                                                       : npg_arena_path(&rig->arena, rig->path, "rig.json");
     NPG_TRY(npg_arena_status(&rig->arena));
-    NPG_TRY(read_json(&root, &text, file));
-    npg_status status = load_root(rig, file, root);
+    npg_status status = npg_json_read(&root, file, NPG_RIG_TEXT_MAX);
+    if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
+    if (!status) status = load_root(rig, file, root);
     json_decref(root);
-    npg_release(&text);
     return status;
 }
