@@ -36,41 +36,40 @@ typedef struct child {
 
 static const char library_mark[] = "an address in this library";
 
-static bool is_program(const char *path)
+/* Beside a file (a build folder), or in a folder of the installation, seen from PREFIX/bin, PREFIX/lib or
+ * PREFIX/lib/<machine>. */
+static bool find_near(char path[4096], const char *file, const char *folder, const char *name)
 {
-    return access(path, X_OK) == 0;
-}
-
-/* Beside a file (a build folder), or where an installation puts the helpers: PREFIX/libexec/neupig, seen from
- * PREFIX/bin, PREFIX/lib or PREFIX/lib/<machine>. */
-static bool find_near(char path[4096], const char *file, const char *name)
-{
-    static const char *const ways[] = {"", "../libexec/neupig/", "../../libexec/neupig/"};
+    static const char *const ways[] = {"", "../", "../../"};
     const char *slash = strrchr(file, '/');
     for (size_t i = 0; slash && i < sizeof ways / sizeof *ways; i++) {
-        int length = snprintf(path, 4096, "%.*s%s%s", (int)(slash - file + 1), file, ways[i], name);
-        if (length < 4096 && is_program(path)) return true;
+        int length =
+            snprintf(path, 4096, "%.*s%s%s%s", (int)(slash - file + 1), file, ways[i], i ? folder : "", name);
+        if (length < 4096 && access(path, R_OK) == 0) return true;
     }
     return false;
 }
 
-/* Beside this program, or beside the shared library that this code lies in: what was installed can be moved,
- * and the program may be anybody's. */
-static npg_status find_program(char path[4096], const char *name)
+/* What was installed can be moved, and the program may be anybody's. */
+bool npg_find_installed(char path[4096], const char *folder, const char *name)
 {
     char self[PATH_MAX];
     Dl_info library = {.dli_fname = NULL};
-    snprintf(path, 4096, "%s", name);
-    if (*name == '/') return is_program(name) ? NPG_OK : npg_error(NPG_FAILED, "%s is no program", name);
     ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
     self[length > 0 ? length : 0] = 0;
-    if (find_near(path, self, name)) return NPG_OK;
-    if (dladdr(library_mark, &library) && library.dli_fname && find_near(path, library.dli_fname, name))
-        return NPG_OK;
-    snprintf(path, 4096, "%s/%s", NPG_LIBEXEC_DIR, name);
-    if (is_program(path)) return NPG_OK;
-    return npg_error(NPG_FAILED, "the helper program %s is neither beside %s nor beside %s nor in %s", name,
-                     self, library.dli_fname ? library.dli_fname : "the library", NPG_LIBEXEC_DIR);
+    return find_near(path, self, folder, name) || (dladdr(library_mark, &library) && library.dli_fname &&
+                                                   find_near(path, library.dli_fname, folder, name));
+}
+
+static npg_status find_program(char path[4096], const char *name)
+{
+    snprintf(path, 4096, "%s", name);
+    if (*name != '/' && npg_find_installed(path, "libexec/neupig/", name)) return NPG_OK;
+    if (*name != '/') snprintf(path, 4096, "%s/%s", NPG_LIBEXEC_DIR, name);
+    if (access(path, X_OK) == 0) return NPG_OK;
+    return npg_error(NPG_FAILED,
+                     "the helper program %s is neither beside the program nor beside the library nor in %s",
+                     name, NPG_LIBEXEC_DIR);
 }
 
 /* ---- start ---- */

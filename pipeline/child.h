@@ -35,6 +35,10 @@ typedef struct npg_child_result {
  * Threads: any number at a time. */
 npg_status npg_child_run(npg_child_result *result, const npg_child_job *job);
 
+/* Find a file of this installation that can be read: beside this program or this library, or in PREFIX/<folder>
+ * ("libexec/neupig/") as seen from there. */
+bool npg_find_installed(char path[4096], const char *folder, const char *name);
+
 /* ---- for the helper ---- */
 
 /* From now on the signal comes when the parent ends; it comes at once where that has ended before, so that it is not

@@ -110,13 +110,13 @@ static npg_status find_sub_folder(npg_arena *arena, const char **out, const char
 {
     static const char *const usual[] = {"points", "point_clouds"};
     npg_paths folders = {.arena = arena};
+    for (size_t u = 0; u < 2; u++) {
+        *out = npg_arena_path(arena, folder, usual[u]);
+        NPG_TRY(npg_arena_status(arena));
+        if (is_folder(*out)) return NPG_OK;
+    }
     NPG_TRY(list_folder(&folders, folder, true));
-    const char *found = folders.count == 1 ? folders.paths[0] : NULL;
-    for (size_t u = 0; u < 2; u++)
-        for (size_t i = 0; i < folders.count; i++)
-            if (!strcmp(strrchr(folders.paths[i], '/') + 1, usual[u]) && (!found || folders.count > 1))
-                if (!found || strcmp(strrchr(found, '/') + 1, usual[0]) != 0) found = folders.paths[i];
-    *out = found;
+    *out = folders.count == 1 ? folders.paths[0] : NULL;
     return NPG_OK;
 }
 

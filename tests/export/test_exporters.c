@@ -366,10 +366,10 @@ static void level_sets_close_openings(void **state)
     assert_true(fabs(volume / fabs(npg_mesh_volume(&whole)) - 1) < 0.05);
     uint32_t *caps;
     size_t cap_count;
-    assert_int_equal(npg_border_caps(&caps, &cap_count, faces, F), NPG_OK);
+    assert_int_equal(npg_border_caps(&caps, &cap_count, V, faces, F), NPG_OK);
     assert_int_equal(cap_count, 0);
     npg_release(&caps);
-    assert_int_equal(npg_border_caps(&caps, &cap_count, faces, 3), NPG_OK); /* the lower half is missing */
+    assert_int_equal(npg_border_caps(&caps, &cap_count, V, faces, 3), NPG_OK); /* the lower half is missing */
     assert_int_equal(cap_count, 1);
     uint32_t closed[12];
     memcpy(closed, faces, 9 * sizeof *closed);

@@ -1,13 +1,13 @@
 /* Page: one HTML file that needs no other, of one result or of two side by side. */
 #include "tools/view/view_internal.h"
 
-#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "pipeline/child.h"
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
@@ -28,27 +28,17 @@ template;
 #define MARK      "<!--neupig-data-->"
 #define SIZE_MOST ((size_t)64 << 20)
 
-/* Beside this program (a build folder), in the share/ of its installation, or where it was meant to be
- * installed. */
-static bool find_template(char path[PATH_MAX])
+static bool find_template(char path[4096])
 {
-    static const char *const ways[] = {"", "../share/neupig/"};
-    char self[PATH_MAX];
-    ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
-    self[length > 0 ? length : 0] = 0;
-    const char *slash = strrchr(self, '/');
-    for (size_t i = 0; slash && i < sizeof ways / sizeof *ways; i++) {
-        int size = snprintf(path, PATH_MAX, "%.*s%s" NAME, (int)(slash - self + 1), self, ways[i]);
-        if (size < PATH_MAX && access(path, R_OK) == 0) return true;
-    }
-    snprintf(path, PATH_MAX, "%s/%s", NPG_DATA_DIR, NAME);
+    if (npg_find_installed(path, "share/neupig/", NAME)) return true;
+    snprintf(path, 4096, "%s/%s", NPG_DATA_DIR, NAME);
     return access(path, R_OK) == 0;
 }
 
 /* NPG_FAILED where it was not built, with what to install. */
 static npg_status open_template(template *page)
 {
-    char path[PATH_MAX];
+    char path[4096];
     *page = (template){.arena = {.purpose = NPG_FOR_FILES}};
     if (!find_template(path))
         return npg_error(NPG_FAILED,

@@ -187,10 +187,11 @@ npg_status npg_write_obj_pose(const char *path, const npg_export_facts *facts, c
 
 /* ---- faces that close the openings of a surface ---- */
 
-/* Fans over the loops of a mesh's border, turned as the faces around them, so that mesh and caps together are
+/* Fans over the pieces of a mesh's border, turned as the faces around them, so that mesh and caps together are
  * closed: 3 indices each, to be given to npg_release(); NULL where there is no border.  They need not be flat
  * nor free of crossings.  The border's edges go in circles, as those of oriented faces do.  NPG_MEMORY. */
-npg_status npg_border_caps(uint32_t **caps, size_t *cap_count, const uint32_t *faces, size_t face_count);
+npg_status npg_border_caps(uint32_t **caps, size_t *cap_count, size_t vert_count, const uint32_t *faces,
+                           size_t face_count);
 
 /* ---- the JSON part of a GLB with one animated mesh ---- */
 

@@ -39,7 +39,7 @@ static npg_status close_openings(vdb_state *s)
     const npg_export_facts *facts = s->writer.facts;
     uint32_t *caps;
     size_t cap_count, size = facts->face_count * 3 * sizeof *caps;
-    NPG_TRY(npg_border_caps(&caps, &cap_count, facts->faces, facts->face_count));
+    NPG_TRY(npg_border_caps(&caps, &cap_count, facts->vert_count, facts->faces, facts->face_count));
     s->face_count = facts->face_count + cap_count;
     npg_status status = npg_alloc_array(&s->faces, NPG_FOR_FILES, s->face_count, 3 * sizeof *s->faces);
     if (!status) memcpy(s->faces, facts->faces, size);
