@@ -48,10 +48,11 @@ npg_status npg_json_read(json_t **root, const char *path, size_t limit)
     FILE *file = fopen(path, "rb");
     bool is_read = file && !fstat(fileno(file), &info);
     bool is_large = is_read && (size_t)info.st_size > limit;
-    if (is_read && !is_large) is_read = getdelim(&text, &room, 0, file) >= 0 || !ferror(file);
+    bool has_text = is_read && !is_large && getdelim(&text, &room, 0, file) >= 0; /* an empty file has none */
+    if (is_read && !is_large && !has_text) is_read = !ferror(file);
     npg_status status = is_large   ? npg_error(NPG_USAGE, "%s: larger than %zu MiB", path, limit >> 20)
                         : !is_read ? npg_error(NPG_USAGE, "%s: %s", path, strerror(errno))
-                                   : npg_json_parse(root, text ? text : nothing, path);
+                                   : npg_json_parse(root, has_text ? text : nothing, path);
     if (file) fclose(file);
     free(text);
     return status;
