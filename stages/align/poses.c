@@ -35,18 +35,14 @@ static size_t nearest_corner(const npg_surface_hit *hit, const npg_mesh *mesh)
 
 static npg_status hang(npg_pose_map *map, const npg_graph *old, const npg_mesh *mesh, const npg_graph *graph)
 {
-    npg_surface *surface = NULL;
     npg_surface_hit *hits;
     NPG_TRY(npg_alloc_array(&hits, NPG_FOR_FIT, map->count, sizeof *hits));
-    npg_status status =
-        npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
-    if (!status) status = npg_surface_closest(surface, hits, graph->node_pos, map->count);
+    npg_status status = npg_mesh_closest(hits, mesh, graph->node_pos, map->count);
     for (size_t k = 0; k < map->count && !status; k++) {
         size_t v = nearest_corner(&hits[k], mesh);
         memcpy(map->node[k], old->vert_node + v * NPG_GRAPH_BIND, sizeof map->node[k]);
         memcpy(map->weight[k], old->vert_weight + v * NPG_GRAPH_BIND, sizeof map->weight[k]);
     }
-    npg_surface_close(&surface);
     npg_release(&hits);
     return status;
 }

@@ -93,8 +93,7 @@ void npg_tracker_close(npg_tracker **slot)
     npg_block_close(&t->system);
     npg_surface_close(&t->surface);
     npg_mesh_unref(&t->reference);
-    npg_arena_release(&t->arena);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 /* Every n-th vertex: Poisson meshes have their vertices evenly over the surface,
@@ -161,10 +160,8 @@ static double size_of(const npg_mesh *reference)
 
 npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tracker_settings *settings)
 {
-    npg_tracker *t;
-    *out = NULL;
-    NPG_TRY(npg_alloc(&t, NPG_FOR_FIT, sizeof *t));
-    t->arena.purpose = NPG_FOR_FIT;
+    NPG_TRY(npg_object_open(out, NPG_FOR_FIT, sizeof **out));
+    npg_tracker *t = *out;
     t->settings = *settings;
     t->reference = npg_mesh_ref(reference);
     t->size = size_of(reference);
@@ -172,8 +169,7 @@ npg_status npg_tracker_open(npg_tracker **out, npg_mesh *reference, const npg_tr
     if (!status) status = open_arrays(t);
     if (!status) status = npg_mesh_border(t->is_border, &t->is_open, t->mesh);
     if (!status) status = open_system(t);
-    if (status) npg_tracker_close(&t);
-    *out = t;
+    if (status) npg_tracker_close(out);
     return status;
 }
 

@@ -44,10 +44,12 @@ typedef struct side {
     double history[NPG_MISFITS][HISTORY];
     size_t history_count; /* ever */
     double key_fit;       /* of the keyframe: what noise alone leaves */
-    record run[RUN_MAX];  /* the suspect frames since the last explained one, the last of them */
-    bool is_unexplained[RUN_MAX];
-    npg_alarm_cause causes[RUN_MAX]; /* the clearest misfit of each */
-    size_t run_count, run_length;    /* kept, and in all */
+    struct suspect {
+        record frame;
+        bool is_unexplained;
+        npg_alarm_cause cause;    /* its clearest misfit */
+    } run[RUN_MAX];               /* since the last explained one, the last of them */
+    size_t run_count, run_length; /* kept, and in all */
     bool is_raised;
     npg_alarm_cause cause;
 } side;
@@ -179,30 +181,27 @@ static void raise_alarm(side *s, size_t row)
     size_t first_unexplained = s->run_count - row, best = first_unexplained;
     size_t first = first_unexplained > NPG_ALARM_FRAMES ? first_unexplained - NPG_ALARM_FRAMES : 0;
     for (size_t i = first_unexplained; i < s->run_count; i++)
-        if (is_clearer(s->causes[i].misfit, times_bound(&s->causes[i]), s->causes[best].misfit,
-                       times_bound(&s->causes[best])))
+        if (is_clearer(s->run[i].cause.misfit, times_bound(&s->run[i].cause), s->run[best].cause.misfit,
+                       times_bound(&s->run[best].cause)))
             best = i;
-    s->cause = s->causes[best];
-    s->cause.index = s->run[first].index;
-    s->cause.number = s->run[first].number;
+    s->cause = s->run[best].cause;
+    s->cause.index = s->run[first].frame.index;
+    s->cause.number = s->run[first].frame.number;
     s->is_raised = true;
 }
 
 static void clear_suspects(side *s)
 {
-    for (size_t i = 0; i < s->run_count; i++) add_to_history(s, &s->run[i]);
+    for (size_t i = 0; i < s->run_count; i++) add_to_history(s, &s->run[i].frame);
     s->run_count = s->run_length = 0;
 }
 
 /* The oldest suspect frame goes into the history: a long run of merely suspect frames becomes usual. */
 static void drop_oldest_suspect(side *s)
 {
-    size_t most = sizeof s->run / sizeof *s->run;
-    if (s->run_count < most) return;
-    add_to_history(s, &s->run[0]);
-    memmove(s->run, s->run + 1, (most - 1) * sizeof *s->run);
-    memmove(s->causes, s->causes + 1, (most - 1) * sizeof *s->causes);
-    memmove(s->is_unexplained, s->is_unexplained + 1, (most - 1) * sizeof *s->is_unexplained);
+    if (s->run_count < RUN_MAX) return;
+    add_to_history(s, &s->run[0].frame);
+    memmove(s->run, s->run + 1, (RUN_MAX - 1) * sizeof *s->run);
     s->run_count--;
 }
 
@@ -219,14 +218,12 @@ static void process_frame(side *s, const record *r)
     }
     drop_oldest_suspect(s);
     s->run_length++;
-    s->run[s->run_count] = *r;
-    s->causes[s->run_count] = cause;
-    s->is_unexplained[s->run_count++] = times > 1;
+    s->run[s->run_count++] = (struct suspect){*r, times > 1, cause};
     size_t row = 0;
     double weight = 0;
-    while (row < s->run_count && s->is_unexplained[s->run_count - 1 - row]) {
+    while (row < s->run_count && s->run[s->run_count - 1 - row].is_unexplained) {
         row++;
-        weight += kinds[s->causes[s->run_count - row].misfit].weight;
+        weight += kinds[s->run[s->run_count - row].cause.misfit].weight;
     }
     if (weight >= NPG_ALARM_FRAMES && s->run_length - row <= 2 * NPG_ALARM_FRAMES) raise_alarm(s, row);
 }

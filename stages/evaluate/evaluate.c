@@ -33,7 +33,7 @@ typedef struct evaluate_state {
     npg_topology watch;
     /* of the run */
     npg_measure *measure; /* opened for the first frame that has a mesh */
-    npg_verdict *verdict;
+    npg_verdict verdict;
     aggregate sums[NPG_FIGURE_ROWS];
     int64_t *bad; /* numbers of the frames below the bar; owned */
     size_t bad_count, bad_capacity, good_count, skipped_count;
@@ -175,9 +175,6 @@ static npg_status take_frame(npg_worker *worker, npg_frame *frame, bool is_new)
     evaluate_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     fault found = fault_of(state, &frame->figures, facts->unseen_share);
-    const npg_verdict_bars bars = {(1 - state->coverage_min / 100) / 2,
-                                   fmax(state->measured.cover_dist, state->residual_max) / 100,
-                                   state->residual_max / 100};
     frame->figures.fault = frame->is_skipped ? 0 : found.kind;
     frame->figures.good = !found.kind && !frame->is_skipped;
     if (frame->is_shared) return NPG_OK;
@@ -187,8 +184,7 @@ static npg_status take_frame(npg_worker *worker, npg_frame *frame, bool is_new)
     if (frame->is_skipped) return NPG_OK;
     if (found.kind) NPG_TRY(note_bad(state, frame->number, &found));
     if (found.kind && is_new) warn_of_bad(worker, frame->number, &found, frame->figures.unsupported_at);
-    if (!state->verdict) NPG_TRY(npg_verdict_open(&state->verdict, &bars, facts->plan.key));
-    return npg_verdict_add(state->verdict, frame);
+    return npg_verdict_add(&state->verdict, frame);
 }
 
 /* When all frames are there: what is wrong with some beside the others. */
@@ -196,9 +192,12 @@ static npg_status judge_together(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
     npg_late_faults *late;
-    if (!state->verdict) return NPG_OK;
+    state->verdict.key = npg_worker_facts(worker)->plan.key;
+    state->verdict.bars = (npg_verdict_bars){(1 - state->coverage_min / 100) / 2,
+                                             fmax(state->measured.cover_dist, state->residual_max) / 100,
+                                             state->residual_max / 100};
     NPG_TRY(npg_alloc(&late, NPG_FOR_RUN, sizeof *late));
-    npg_status status = npg_verdict_finish(state->verdict, late);
+    npg_status status = npg_verdict_finish(&state->verdict, late);
     for (size_t i = 0; i < late->count && !status; i++) {
         const fault found = {late->faults[i].fault, late->faults[i].value, late->faults[i].bound};
         status = note_bad(state, late->faults[i].number, &found);
@@ -342,7 +341,7 @@ static void uninit(npg_worker *worker)
     evaluate_state *state = npg_worker_state(worker);
     npg_measure_close(&state->measure);
     npg_alarm_close(&state->watch.alarm);
-    npg_verdict_close(&state->verdict);
+    npg_release(&state->verdict.records);
     npg_release(&state->bad);
 }
 

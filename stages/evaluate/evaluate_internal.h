@@ -190,16 +190,18 @@ npg_level npg_level_of(double *values, size_t count, double floor);
  *
  * Four frames are the least that say what is usual.  Memory: 160 bytes a frame. */
 
-typedef struct npg_verdict npg_verdict;
-
 typedef struct npg_verdict_bars {
     double uncovered;   /* share of the surface, the least that counts; 1: nothing does */
     double vertex_dist; /* the same in diagonals                                        */
     double jump;        /* the same                                                     */
 } npg_verdict_bars;
 
-npg_status npg_verdict_open(npg_verdict **verdict, const npg_verdict_bars *bars, int64_t key);
-void npg_verdict_close(npg_verdict **verdict);
+typedef struct npg_verdict {
+    npg_verdict_bars bars;
+    int64_t key;
+    struct npg_verdict_record *records; /* NULL at first; owned */
+    size_t count, room;
+} npg_verdict;
 
 /* A frame with its figures, in any order; one that was not measured, or is another segment's, is passed
  * over. */

@@ -17,10 +17,10 @@
 #define STRETCH 10.0 /* times the area, or a tenth of it: the measure of bad faces in neupig eval */
 
 struct npg_shape {
+    npg_arena arena;
     const npg_mesh *reference; /* loan */
     uint32_t (*edges)[2];      /* E x 2; owned */
     size_t edge_count;
-    npg_arena arena;
     double *areas;     /* F, of the reference                                     */
     double *cosines;   /* F, each face against its neighbourhood in the reference */
     double *normals;   /* F x 3 scratch                                           */
@@ -58,7 +58,6 @@ static npg_status open_shape(npg_shape *shape)
 {
     const npg_mesh *mesh = shape->reference;
     size_t v = mesh->vert_count, f = mesh->face_count;
-    shape->arena.purpose = NPG_FOR_MESH;
     shape->areas = npg_arena_take(&shape->arena, f, sizeof *shape->areas);
     shape->cosines = npg_arena_take(&shape->arena, f, sizeof *shape->cosines);
     shape->normals = npg_arena_take(&shape->arena, f, 3 * sizeof *shape->normals);
@@ -74,12 +73,10 @@ static npg_status open_shape(npg_shape *shape)
 
 npg_status npg_shape_open(npg_shape **out, const npg_mesh *reference)
 {
-    npg_shape *shape;
-    NPG_TRY(npg_alloc(&shape, NPG_FOR_MESH, sizeof *shape));
-    shape->reference = reference;
-    npg_status status = open_shape(shape);
-    if (status) npg_shape_close(&shape);
-    *out = shape;
+    NPG_TRY(npg_object_open(out, NPG_FOR_MESH, sizeof **out));
+    (*out)->reference = reference;
+    npg_status status = open_shape(*out);
+    if (status) npg_shape_close(out);
     return status;
 }
 
@@ -87,8 +84,7 @@ void npg_shape_close(npg_shape **slot)
 {
     if (!*slot) return;
     npg_release(&(*slot)->edges);
-    npg_arena_release(&(*slot)->arena);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 static double length_of(const float *vert_pos, const uint32_t edge[2])
@@ -129,6 +125,7 @@ void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float
 /* ---- the figures' room ---- */
 
 struct npg_measure {
+    npg_arena arena; /* of the arrays from `visible` on */
     npg_measure_settings settings;
     npg_proxy *proxy;     /* W vertices of the reference: the surface that distances are to */
     npg_surface *surface; /* moves from frame to frame */
@@ -137,7 +134,6 @@ struct npg_measure {
     float *points, *dists; /* N x 3 and max(N, W), of the frame at hand, in units; owned */
     npg_surface_hit *hits; /* N; owned */
     size_t points_capacity, dists_capacity, hits_capacity;
-    npg_arena arena;      /* has all that follow */
     npg_visible visible;  /* of the sensors' rays: W */
     float *vert_unit;     /* W x 3               */
     uint32_t *nearest;    /* W                   */
@@ -177,7 +173,6 @@ static npg_status fill(npg_measure *m, const npg_mesh *reference, double unseen_
     npg_mesh *mesh = m->proxy->mesh;
     size_t w = mesh->vert_count;
     NPG_TRY(npg_misfit_open(&m->finder, mesh, unseen_share));
-    m->arena.purpose = NPG_FOR_QUERY;
     npg_visible_open(&m->visible, &m->arena, w);
     m->vert_unit = npg_arena_take(&m->arena, w, 3 * sizeof *m->vert_unit);
     m->nearest = npg_arena_take(&m->arena, w, sizeof *m->nearest);
@@ -193,12 +188,10 @@ static npg_status fill(npg_measure *m, const npg_mesh *reference, double unseen_
 npg_status npg_measure_open(npg_measure **measure, const npg_mesh *reference, double unseen_share,
                             const npg_measure_settings *settings)
 {
-    npg_measure *m;
-    NPG_TRY(npg_alloc_array(&m, NPG_FOR_QUERY, 1, sizeof *m));
-    m->settings = *settings;
-    npg_status status = fill(m, reference, unseen_share);
-    if (status) npg_measure_close(&m);
-    *measure = m;
+    NPG_TRY(npg_object_open(measure, NPG_FOR_QUERY, sizeof **measure));
+    (*measure)->settings = *settings;
+    npg_status status = fill(*measure, reference, unseen_share);
+    if (status) npg_measure_close(measure);
     return status;
 }
 
@@ -213,8 +206,7 @@ void npg_measure_close(npg_measure **measure)
     npg_release(&m->points);
     npg_release(&m->dists);
     npg_release(&m->hits);
-    npg_arena_release(&m->arena);
-    npg_release(measure);
+    npg_object_close(measure);
 }
 
 size_t npg_measure_memory(const npg_measure_settings *settings, size_t point_count, size_t vert_count)

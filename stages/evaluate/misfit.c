@@ -24,10 +24,10 @@
 #define VACATED_SHARE  0.6   /* of the points that a part should have                                 */
 
 struct npg_misfit_finder {
+    npg_arena arena;           /* of all below, but for the edges               */
     const npg_mesh *reference; /* loan                                          */
     double size;               /* its diagonal                                  */
     bool is_closed;            /* has no border, and its frame saw all of it    */
-    npg_arena arena;           /* of all below, but for the edges               */
     uint8_t *is_border;        /* V: on the border of what its frame saw        */
     uint32_t (*edges)[2];      /* E x 2; owned                                  */
     size_t edge_count;
@@ -62,14 +62,12 @@ static npg_status measure_reference(npg_misfit_finder *f)
 
 npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, double unseen_share)
 {
-    npg_misfit_finder *finder;
-    NPG_TRY(npg_alloc(&finder, NPG_FOR_MESH, sizeof *finder));
+    NPG_TRY(npg_object_open(out, NPG_FOR_MESH, sizeof **out));
+    npg_misfit_finder *finder = *out;
     finder->reference = reference;
     finder->is_closed = unseen_share <= UNSEEN_MOST;
-    finder->arena.purpose = NPG_FOR_MESH;
     npg_status status = measure_reference(finder);
-    if (status) npg_misfit_close(&finder);
-    *out = finder;
+    if (status) npg_misfit_close(out);
     return status;
 }
 
@@ -77,8 +75,7 @@ void npg_misfit_close(npg_misfit_finder **slot)
 {
     if (!*slot) return;
     npg_release(&(*slot)->edges);
-    npg_arena_release(&(*slot)->arena);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 /* ---- the four kinds ---- */

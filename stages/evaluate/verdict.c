@@ -13,7 +13,7 @@
 
 enum { AROUND = NPG_ALARM_FRAMES }; /* motions on either side that tell what is usual, odd frames in a row */
 
-typedef struct record {
+typedef struct npg_verdict_record {
     int64_t index, number;
     double uncovered, vertex_dist;
     float marks[3 * NPG_MARKS];
@@ -21,27 +21,6 @@ typedef struct record {
     bool is_late;
     double value, bound;
 } record;
-
-struct npg_verdict {
-    npg_verdict_bars bars;
-    int64_t key;
-    record *records; /* owned */
-    size_t count, room;
-};
-
-npg_status npg_verdict_open(npg_verdict **out, const npg_verdict_bars *bars, int64_t key)
-{
-    NPG_TRY(npg_alloc(out, NPG_FOR_RUN, sizeof **out));
-    **out = (npg_verdict){.bars = *bars, .key = key};
-    return NPG_OK;
-}
-
-void npg_verdict_close(npg_verdict **slot)
-{
-    if (!*slot) return;
-    npg_release(&(*slot)->records);
-    npg_release(slot);
-}
 
 npg_status npg_verdict_add(npg_verdict *verdict, const npg_frame *frame)
 {

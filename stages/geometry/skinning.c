@@ -9,9 +9,9 @@
 #define PARTS_MAX  8
 
 struct npg_skin {
+    npg_arena arena;       /* of is_border to spread */
     npg_mesh *mesh;        /* counted reference; V, F */
     npg_surface *surface;  /* where it is now */
-    npg_arena arena;       /* of the next five */
     uint8_t *is_border;    /* V */
     float *now, *normals;  /* V x 3: positions and normals there */
     float *turns, *spread; /* V x 9: rotation of the neighbourhood, rows */
@@ -23,12 +23,10 @@ struct npg_skin {
 
 npg_status npg_skin_open(npg_skin **out, npg_mesh *reference)
 {
-    npg_skin *c;
     size_t v = reference->vert_count;
-    *out = NULL;
-    NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
+    NPG_TRY(npg_object_open(out, NPG_FOR_MESH, sizeof **out));
+    npg_skin *c = *out;
     c->mesh = npg_mesh_ref(reference);
-    c->arena.purpose = NPG_FOR_MESH;
     c->is_border = npg_arena_take(&c->arena, v, 1);
     c->now = npg_arena_take(&c->arena, v, 3 * sizeof *c->now);
     c->normals = npg_arena_take(&c->arena, v, 3 * sizeof *c->normals);
@@ -39,8 +37,7 @@ npg_status npg_skin_open(npg_skin **out, npg_mesh *reference)
     if (!status)
         status =
             npg_surface_open(&c->surface, reference->vert_pos, v, reference->faces, reference->face_count);
-    if (status) npg_skin_close(&c);
-    *out = c;
+    if (status) npg_skin_close(out);
     return status;
 }
 
@@ -50,8 +47,7 @@ void npg_skin_close(npg_skin **slot)
     npg_surface_close(&(*slot)->surface);
     npg_mesh_unref(&(*slot)->mesh);
     npg_release(&(*slot)->hits);
-    npg_arena_release(&(*slot)->arena);
-    npg_release(slot);
+    npg_object_close(slot);
 }
 
 bool npg_skin_is_open(const npg_skin *skin)

@@ -8,21 +8,15 @@
 #ifndef NPG_OPTIMIZE_CARRY_H
 #define NPG_OPTIMIZE_CARRY_H
 
-#include "pipeline/mesh.h"
+#include "geometry/geometry.h"
 
-typedef struct npg_carrier {
-    uint32_t vertex[3]; /* of the coarse surface */
-    float share[3];
-} npg_carrier;
-
-/* Which vertices of `coarse`, at rest, carry the points (N x 3). */
-npg_status npg_carriers_bind(npg_carrier *carriers, const npg_mesh *coarse, const float *points,
-                             size_t count);
-
-/* to (N x 3) += the ways (x 3) of the coarse vertices. */
-void npg_carry(const npg_carrier *carriers, size_t count, float *to, const float *ways);
+/* Both of N points whose closest places on the coarse surface at rest are hits (npg_mesh_closest()).
+ * to (N x 3) += the ways (x 3) of the coarse vertices. */
+void npg_carry(float *to, const npg_mesh *coarse, const npg_surface_hit *hits, size_t count,
+               const float *ways);
 
 /* ways (x 3) += what of N values (x 3) falls to each coarse vertex: the transpose. */
-void npg_carry_back(const npg_carrier *carriers, size_t count, float *ways, const float *values);
+void npg_carry_back(float *ways, const npg_mesh *coarse, const npg_surface_hit *hits, size_t count,
+                    const float *values);
 
 #endif

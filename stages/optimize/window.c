@@ -14,9 +14,9 @@ struct npg_window_solver {
     const npg_facts *facts; /* loan */
     size_t vert_count;      /* V    */
     /* with poses */
-    npg_proxy *surface;    /* W vertices; owned */
-    npg_carrier *carriers; /* V, owned          */
-    npg_energy *energy;    /* owned             */
+    npg_proxy *surface;      /* W vertices; owned */
+    npg_surface_hit *places; /* V: on these; owned */
+    npg_energy *energy;      /* owned             */
     /* of the window at work */
     npg_arena window;         /* holds these                                         */
     size_t count, size;       /* T, and floats of a frame's result: 3 W or 3 V       */
@@ -33,7 +33,7 @@ void npg_window_solver_close(npg_window_solver **slot)
     if (s->solver) s->row->close(&s->solver);
     npg_energy_close(&s->energy);
     npg_proxy_close(&s->surface);
-    npg_release(&s->carriers);
+    npg_release(&s->places);
     npg_release(slot);
 }
 
@@ -42,8 +42,8 @@ static npg_status open_surface(npg_window_solver *s)
     const npg_mesh *reference = s->facts->reference;
     NPG_TRY(npg_proxy_open(&s->surface, reference, NPG_PROXY_SURFACE));
     NPG_TRY(npg_energy_open(&s->energy, s->surface->mesh, &s->settings.energy));
-    NPG_TRY(npg_alloc_array(&s->carriers, NPG_FOR_FIT, s->vert_count, sizeof *s->carriers));
-    return npg_carriers_bind(s->carriers, s->surface->mesh, reference->vert_pos, s->vert_count);
+    NPG_TRY(npg_alloc_array(&s->places, NPG_FOR_FIT, s->vert_count, sizeof *s->places));
+    return npg_mesh_closest(s->places, s->surface->mesh, reference->vert_pos, s->vert_count);
 }
 
 npg_status npg_window_solver_open(npg_window_solver **out, const npg_solver *row, struct npg_device *device,
@@ -73,7 +73,7 @@ size_t npg_window_memory(const npg_solver *row, const npg_solver_settings *setti
     size_t surface = vert_count < 2 * NPG_PROXY_SURFACE ? vert_count : NPG_PROXY_SURFACE;
     size_t solved = frames * vert_count * vector, clouds = frames * points * vector;
     if (!row->needs_poses) return 2 * solved + clouds + row->memory(settings, vert_count, frames, points);
-    return solved + clouds + 2 * frames * surface * vector + vert_count * sizeof(npg_carrier) +
+    return solved + clouds + 2 * frames * surface * vector + vert_count * sizeof(npg_surface_hit) +
            npg_energy_memory(&settings->energy, surface, frames) +
            row->memory(settings, surface, frames, points);
 }
@@ -158,7 +158,7 @@ static void keep_posed(npg_window_solver *s, npg_held *held, size_t t, float sha
     float *way = s->result + t * s->size;
     for (size_t i = 0; i < s->size && held->solved; i++) way[i] = before[i] + share * way[i] - before[i];
     take_pose(held);
-    npg_carry(s->carriers, s->vert_count, held->solved, way);
+    npg_carry(held->solved, s->surface->mesh, s->places, s->vert_count, way);
 }
 
 static npg_status keep_unposed(npg_window_solver *s, npg_held *held, size_t t, float share)

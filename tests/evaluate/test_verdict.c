@@ -41,21 +41,19 @@ static void move(int from, int to, float by)
 /* The faults of the first `count` frames: their kinds, by index; 0 where there is none. */
 static void judge(int faults[FRAMES], int count)
 {
-    const npg_verdict_bars bars = {0.25, 0.01, 0.005};
-    npg_verdict *verdict;
+    npg_verdict verdict = {.bars = {0.25, 0.01, 0.005}, .key = KEY};
     npg_late_faults late;
     memset(faults, 0, FRAMES * sizeof *faults);
-    assert_int_equal(npg_verdict_open(&verdict, &bars, KEY), NPG_OK);
     for (int i = 0; i < count; i++) /* in no order */
-        assert_int_equal(npg_verdict_add(verdict, &frames[(7 * i + 3) % count]), NPG_OK);
-    assert_int_equal(npg_verdict_finish(verdict, &late), NPG_OK);
+        assert_int_equal(npg_verdict_add(&verdict, &frames[(7 * i + 3) % count]), NPG_OK);
+    assert_int_equal(npg_verdict_finish(&verdict, &late), NPG_OK);
     for (size_t i = 0; i < late.count; i++) {
         assert_int_equal(late.faults[i].number, 100 + late.faults[i].index);
         assert_true(late.faults[i].value > late.faults[i].bound);
         faults[late.faults[i].index] = late.faults[i].fault;
     }
     npg_release(&late.faults);
-    npg_verdict_close(&verdict);
+    npg_release(&verdict.records);
     assert_int_equal(npg_memory_used(), 0);
 }
 

@@ -24,10 +24,10 @@
 typedef struct grids {
     const npg_facts *facts; /* loan */
     int64_t epochs;
-    npg_proxy *samples;    /* S vertices of the surface; owned */
-    size_t vert_count;     /* W                                */
-    npg_carrier *carriers; /* W, owned                         */
-    npg_fit *fit;          /* over the samples                 */
+    npg_proxy *samples;      /* S vertices of the surface; owned */
+    size_t vert_count;       /* W                                */
+    npg_surface_hit *places; /* W: on these; owned             */
+    npg_fit *fit;            /* over the samples                 */
     /* of the window at work */
     npg_energy_system *system; /* loan                                           */
     double at_start, least;    /* E(s), and the least so far                     */
@@ -49,7 +49,7 @@ static void grids_close(void **slot)
     npg_arena_release(&g->window);
     npg_fit_close(&g->fit);
     npg_proxy_close(&g->samples);
-    npg_release(&g->carriers);
+    npg_release(&g->places);
     npg_release(slot);
 }
 
@@ -73,8 +73,8 @@ static npg_status grids_open(void **out, const npg_solver_setup *setup)
     g->window.purpose = NPG_FOR_FIT;
     g->vert_count = surface->vert_count;
     NPG_TRY(npg_proxy_open(&g->samples, surface, SAMPLES));
-    NPG_TRY(npg_alloc_array(&g->carriers, NPG_FOR_FIT, g->vert_count, sizeof *g->carriers));
-    NPG_TRY(npg_carriers_bind(g->carriers, g->samples->mesh, surface->vert_pos, g->vert_count));
+    NPG_TRY(npg_alloc_array(&g->places, NPG_FOR_FIT, g->vert_count, sizeof *g->places));
+    NPG_TRY(npg_mesh_closest(g->places, g->samples->mesh, surface->vert_pos, g->vert_count));
     return npg_fit_open(&g->fit, setup->device, &settings, g->samples->mesh, setup->seed);
 }
 
@@ -88,7 +88,7 @@ static npg_status carry_frames(void *user, size_t part)
         float *way = g->gradient + t * s; /* scratch until the energy's is there */
         for (size_t i = 0; i < s; i++) way[i] = g->scale * (g->field[t * s + i] - g->before[t * s + i]);
         memset(g->ways + t * w, 0, w * sizeof(float));
-        npg_carry(g->carriers, g->vert_count, g->ways + t * w, way);
+        npg_carry(g->ways + t * w, g->samples->mesh, g->places, g->vert_count, way);
     }
     return NPG_OK;
 }
@@ -109,7 +109,7 @@ static npg_status measure_frames(void *user, size_t part)
             image[i] = 2 * g->scale * (image[i] - right[i]);
         }
         memset(g->gradient + t * s, 0, s * sizeof(float));
-        npg_carry_back(g->carriers, g->vert_count, g->gradient + t * s, image);
+        npg_carry_back(g->gradient + t * s, g->samples->mesh, g->places, g->vert_count, image);
     }
     return NPG_OK;
 }
@@ -208,7 +208,7 @@ static size_t grids_memory(const npg_solver_settings *settings, size_t verts, si
     size_t samples = verts < 2 * SAMPLES ? verts : SAMPLES;
     (void)points;
     return npg_fit_memory(&fit, samples, frames, 0) + frames * (2 * verts + samples) * 3 * sizeof(float) +
-           verts * sizeof(npg_carrier);
+           verts * sizeof(npg_surface_hit);
 }
 
 /* ---- states ---- */
