@@ -97,29 +97,21 @@ static bool is_lost(const recovery *r, const npg_recover_frame *frame)
     return is_off(r, frame) && frame->tracked.point_dist_sq > POINTS_LOST * r->point_level;
 }
 
-static double chamfer_of(const npg_recover_frame *frame)
-{
-    return frame->tracked.chamfer;
-}
-
-static double point_dist_sq_of(const npg_recover_frame *frame)
-{
-    return frame->tracked.point_dist_sq;
-}
-
-static double best_quarter(const recovery *r, double (*figure)(const npg_recover_frame *frame))
+/* offset: of a figure in npg_tracked. */
+static double best_quarter(const recovery *r, size_t offset)
 {
     size_t known = 0;
     for (size_t i = 0; i < r->count; i++)
-        if (is_known(&r->frames[i])) r->sorted[known++] = figure(&r->frames[i]);
+        if (is_known(&r->frames[i]))
+            r->sorted[known++] = *(const double *)((const char *)&r->frames[i].tracked + offset);
     qsort(r->sorted, known, sizeof *r->sorted, npg_order_double);
     return known ? r->sorted[known / 4] : 0;
 }
 
 static void set_levels(recovery *r)
 {
-    r->level = fmax(LEVEL_LEAST, best_quarter(r, chamfer_of));
-    r->point_level = best_quarter(r, point_dist_sq_of);
+    r->level = fmax(LEVEL_LEAST, best_quarter(r, offsetof(npg_tracked, chamfer)));
+    r->point_level = best_quarter(r, offsetof(npg_tracked, point_dist_sq));
 }
 
 /* ---- frames that look alike ---- */

@@ -26,17 +26,15 @@ struct npg_energy {
     npg_mesh_neighbours ring;
     size_t threads;
     npg_point_matcher matchers[THREADS_MAX];
-    npg_arena window; /* holds what follows, of the window at work */
-    float *positions; /* T x W x 3: where the frames' surfaces are */
-    float *shares, *lambda, *bend, *ties;
+    npg_arena window;              /* holds what follows, of the window at work */
+    float *positions;              /* T x W x 3: where the frames' surfaces are */
+    float *lambda;                 /* W */
     const npg_energy_frame *given; /* loan */
     bool *is_known;
-    double *spreads, *scores; /* T */
-    npg_energy_frame *frames; /* T, on `positions` */
-    npg_point_pull *pulls;
-    size_t *pull_counts;
+    double *spreads, *scores;   /* T */
+    npg_energy_frame *frames;   /* T, on `positions` */
     npg_time_quadric *quadrics; /* T x W: what the points say of the frames as they came */
-    npg_energy_system system;
+    npg_energy_system system;   /* its arrays, too */
     double noise, lambda_median;
 };
 
@@ -90,27 +88,22 @@ static npg_status open_window(npg_energy *e, const npg_energy_frame *frames, siz
     npg_arena *a = &e->window;
     npg_arena_release(a);
     e->positions = npg_arena_take(a, count * w, 3 * sizeof(float));
-    e->shares = npg_arena_take(a, count, sizeof(float));
     e->lambda = npg_arena_take(a, w, sizeof(float));
-    e->bend = npg_arena_take(a, w, sizeof(float));
-    e->ties = npg_arena_take(a, w, sizeof(float));
     e->is_known = npg_arena_take(a, count, sizeof(bool));
     e->spreads = npg_arena_take(a, count, sizeof(double));
     e->scores = npg_arena_take(a, count, sizeof(double));
     e->frames = npg_arena_take(a, count, sizeof *e->frames);
-    e->pulls = npg_arena_take(a, count * most, sizeof *e->pulls);
-    e->pull_counts = npg_arena_take(a, count, sizeof *e->pull_counts);
     e->quadrics = npg_arena_take(a, count * w, sizeof *e->quadrics);
     e->system = (npg_energy_system){.frame_count = count,
                                     .vert_count = w,
                                     .ring = e->ring,
-                                    .lambda = e->bend,
+                                    .lambda = npg_arena_take(a, w, sizeof(float)),
                                     .shape = e->settings.shape,
-                                    .pulls = e->pulls,
-                                    .pull_counts = e->pull_counts,
+                                    .pulls = npg_arena_take(a, count * most, sizeof(npg_point_pull)),
+                                    .pull_counts = npg_arena_take(a, count, sizeof(size_t)),
                                     .most = most,
-                                    .ties = e->ties,
-                                    .shares = e->shares,
+                                    .ties = npg_arena_take(a, w, sizeof(float)),
+                                    .shares = npg_arena_take(a, count, sizeof(float)),
                                     .right = npg_arena_take(a, count * w, 3 * sizeof(float))};
     NPG_TRY(npg_arena_status(a));
     for (size_t t = 0; t < count; t++) {
@@ -155,18 +148,18 @@ static npg_status weigh_frames(npg_energy *e, size_t count)
     double usual = median_spread(e, count);
     for (size_t t = 0; t < count; t++) {
         double over = usual > 0 ? e->spreads[t] / usual : 1, off = fmax(0, over - 1);
-        e->shares[t] = e->frames[t].point_count ? (float)(1 / (1 + off * off)) : 0;
+        e->system.shares[t] = e->frames[t].point_count ? (float)(1 / (1 + off * off)) : 0;
     }
     return NPG_OK;
 }
 
-/* Uses bend as scratch. */
+/* Uses the system's as scratch. */
 static double lambda_median(npg_energy *e)
 {
     size_t w = e->mesh->vert_count;
-    memcpy(e->bend, e->lambda, w * sizeof *e->bend);
-    qsort(e->bend, w, sizeof *e->bend, npg_order_float);
-    return (double)e->bend[w / 2];
+    memcpy(e->system.lambda, e->lambda, w * sizeof *e->system.lambda);
+    qsort(e->system.lambda, w, sizeof *e->system.lambda, npg_order_float);
+    return (double)e->system.lambda[w / 2];
 }
 
 static npg_status match_frames(void *user, size_t part)
@@ -174,9 +167,10 @@ static npg_status match_frames(void *user, size_t part)
     frame_work *r = user;
     npg_energy *e = r->e;
     for (size_t t = part; t < r->count; t += e->threads) {
-        npg_point_pull *pulls = e->pulls + t * (size_t)e->settings.points;
+        npg_point_pull *pulls = e->system.pulls + t * (size_t)e->settings.points;
         double width = WIDTH * fmax(fmax(e->spreads[t], e->noise), NOISE_LEAST);
-        NPG_TRY(npg_point_matcher_match(&e->matchers[part], pulls, &e->pull_counts[t], &e->frames[t], width));
+        NPG_TRY(npg_point_matcher_match(&e->matchers[part], pulls, &e->system.pull_counts[t], &e->frames[t],
+                                        width));
     }
     return NPG_OK;
 }
@@ -187,8 +181,8 @@ static npg_status gather_quadrics(void *user, size_t part)
     frame_work *r = user;
     npg_energy *e = r->e;
     for (size_t t = part; t < r->count; t += e->threads)
-        for (size_t i = 0; i < e->pull_counts[t]; i++) {
-            const npg_point_pull *p = &e->pulls[t * (size_t)e->settings.points + i];
+        for (size_t i = 0; i < e->system.pull_counts[t]; i++) {
+            const npg_point_pull *p = &e->system.pulls[t * (size_t)e->settings.points + i];
             float across = 0;
             for (int a = 0; a < 3; a++) across += p->normal[a] * p->offset[a];
             for (int c = 0; c < 3; c++)
@@ -210,8 +204,8 @@ static double points_of(const npg_energy *e, size_t count)
 
 static npg_status smooth(npg_energy *e, size_t count)
 {
-    const npg_time_frames f = {count,     e->mesh->vert_count, e->positions,
-                               e->shares, e->is_known,         points_of(e, count)};
+    const npg_time_frames f = {count,       e->mesh->vert_count, e->positions, e->system.shares,
+                               e->is_known, points_of(e, count)};
     frame_work r = {e, count};
     NPG_TRY(weigh_frames(e, count));
     NPG_TRY(npg_parallel(match_frames, &r, e->threads));
@@ -231,7 +225,7 @@ static void pull_to_pose(npg_energy *e, float *right, size_t t)
 {
     const float *now = e->frames[t].positions, *pose = e->given[t].positions;
     for (size_t i = 0; i < 3 * e->mesh->vert_count; i++)
-        right[i] += e->shares[t] * e->ties[i / 3] * (pose[i] - now[i]);
+        right[i] += e->system.shares[t] * e->system.ties[i / 3] * (pose[i] - now[i]);
 }
 
 /* The right side: -gradient / 2 of the energy where the surface is now. */
@@ -265,15 +259,15 @@ static void set_bend(npg_energy *e, size_t count)
 {
     double strength = 0, frames = 0;
     for (size_t t = 0; t < count; t++) {
-        for (size_t i = 0; i < e->pull_counts[t]; i++)
-            strength += (double)e->pulls[t * e->system.most + i].strength;
-        frames += e->pull_counts[t] > 0;
+        for (size_t i = 0; i < e->system.pull_counts[t]; i++)
+            strength += (double)e->system.pulls[t * e->system.most + i].strength;
+        frames += e->system.pull_counts[t] > 0;
     }
     double each = frames > 0 ? strength / (frames * (double)e->mesh->vert_count) : 1;
     for (size_t v = 0; v < e->mesh->vert_count; v++) {
         double even = (double)e->lambda[v] * e->lambda_median / (EVEN * EVEN);
-        e->ties[v] = (float)(each * (TRUST_LEAST + TRUST / (1 + even)));
-        e->bend[v] = (float)((double)e->lambda[v] * (each + (double)e->ties[v]));
+        e->system.ties[v] = (float)(each * (TRUST_LEAST + TRUST / (1 + even)));
+        e->system.lambda[v] = (float)((double)e->lambda[v] * (each + (double)e->system.ties[v]));
     }
 }
 
@@ -314,8 +308,8 @@ npg_energy_system *npg_energy_system_of(npg_energy *e)
 static double pulls_at_start(const npg_energy *e, size_t t)
 {
     double sum = 0;
-    for (size_t i = 0; i < e->pull_counts[t]; i++) {
-        const npg_point_pull *p = &e->pulls[t * e->system.most + i];
+    for (size_t i = 0; i < e->system.pull_counts[t]; i++) {
+        const npg_point_pull *p = &e->system.pulls[t * e->system.most + i];
         double across = 0;
         for (int a = 0; a < 3; a++) across += (double)p->normal[a] * (double)p->offset[a];
         sum += (double)p->strength * across * across;
@@ -333,7 +327,8 @@ static double poses_and_bend_at_start(const npg_energy *e, size_t t)
     for (size_t i = 0; i < row; i++) {
         double off = (double)now[i] - (double)pose[i];
         double bend = is_inner ? (double)now[i] - 2 * (double)now[i + row] + (double)now[i + 2 * row] : 0;
-        sum += (double)(e->shares[t] * e->ties[i / 3]) * off * off + (double)e->bend[i / 3] * bend * bend;
+        sum += (double)(e->system.shares[t] * e->system.ties[i / 3]) * off * off +
+               (double)e->system.lambda[i / 3] * bend * bend;
     }
     return sum;
 }

@@ -138,14 +138,14 @@ typedef struct npg_point_pull {
 typedef struct npg_energy_system {
     size_t frame_count, vert_count; /* T, W */
     npg_mesh_neighbours ring;       /* loan */
-    const float *lambda;            /* W: bend of the motion, times points per vertex; loan */
+    float *lambda;                  /* W: bend of the motion, times points per vertex; loan */
     double shape;                   /* weight of an edge                            */
-    const npg_point_pull *pulls;    /* `most` per frame; loan */
-    const size_t *pull_counts;      /* T; loan */
+    npg_point_pull *pulls;          /* `most` per frame; loan */
+    size_t *pull_counts;            /* T; loan */
     size_t most;
-    const float *ties;   /* W: weight of staying where a frame's own pose is; loan */
-    const float *shares; /* T: of the frames' ties; loan                     */
-    float *right;        /* T x W x 3: r                                     */
+    float *ties;   /* W: weight of staying where a frame's own pose is; loan */
+    float *shares; /* T: of the frames' ties; loan                     */
+    float *right;  /* T x W x 3: r                                     */
 } npg_energy_system;
 
 /* image_t = the rows of A d that belong to frame t; d and image: T x W x 3. */

@@ -89,7 +89,7 @@ static void ways_follow_a_loss_of_the_callers(void **state)
             targets[t * 3 * VERTS + i] = 0.02f * (float)(t + 1) * ball->vert_pos[i - i % 3 + (i + 1) % 3];
     }
     assert_int_equal(npg_fit_open(&fit, device, &settings, ball, 3), 0);
-    assert_int_equal(npg_fit_begin_measured(fit, frames, FRAMES, measure_ways, targets), 0);
+    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0, measure_ways, targets), 0);
     assert_int_equal(npg_fit_run(fit, 0, 300, first_and_last, losses), 0);
     for (size_t t = 0; t < FRAMES; t++) {
         assert_int_equal(npg_fit_vertices(fit, way, t), 0);
@@ -116,7 +116,7 @@ static void tied_frames_follow_their_tie(void **state)
     frames[0].tie = tie;
     for (int t = 0; t < 2; t++) frames[t].points = points, frames[t].count = VERTS;
     assert_int_equal(npg_fit_open(&fit, device, &settings, ball, 3), 0);
-    assert_int_equal(npg_fit_begin(fit, frames, 2, 0), 0);
+    assert_int_equal(npg_fit_begin(fit, frames, 2, 0, NULL, NULL), 0);
     assert_int_equal(npg_fit_run(fit, 0, 200, NULL, NULL), 0);
     assert_int_equal(npg_fit_vertices(fit, end, 0), 0);
     for (int i = 0; i < 3 * VERTS; i++) {
@@ -143,12 +143,12 @@ static void the_warm_start_is_exact_on_the_overlap(void **state)
         frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL};
     }
     assert_int_equal(npg_fit_open(&fit, device, &small, ball, 3), 0);
-    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
+    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0, NULL, NULL), 0);
     assert_int_equal(npg_fit_run(fit, 0, 12, NULL, NULL), 0);
     for (size_t i = 0; i < FRAMES; i++) assert_int_equal(npg_fit_vertices(fit, end[i], i), 0);
     for (int i = 0; i < FRAMES; i++) frames[i].index++, frames[i].time += 0.5; /* the next window */
     for (int i = 0; i + 1 < FRAMES; i++) frames[i].points = points[i + 1];
-    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0), 0);
+    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0, NULL, NULL), 0);
     assert_int_equal(npg_fit_run(fit, 0, 0, NULL, NULL), 0);
     for (size_t i = 0; i + 1 < FRAMES; i++) {
         assert_int_equal(npg_fit_vertices(fit, again, i), 0);

@@ -123,25 +123,14 @@ static npg_status remove_in(const char *folder, const char *name)
 
 /* ---- other verbs ---- */
 
+/* One of several: it was done for a list that lies elsewhere. */
 static bool is_part(const char *folder)
 {
-    char *above;
-    char *real = realpath(folder, NULL);
-    const char *slash = real ? strrchr(real, '/') : NULL;
-    bool found = false;
-    if (slash && slash > real && !npg_copy_text(&above, real)) {
-        above[slash - real] = 0;
-        json_t *saved = npg_json_in(above, WHOLE);
-        const json_t *list = json_object_get(saved, "segments");
-        for (size_t i = 0; i < json_array_size(list); i++) {
-            const char *name = json_string_value(json_object_get(json_array_get(list, i), "folder"));
-            found = found || (name && !strcmp(name, slash + 1));
-        }
-        json_decref(saved);
-        npg_release(&above);
-    }
-    free(real);
-    return found;
+    json_t *done = npg_json_in(folder, "done.json");
+    const char *mode = json_string_value(npg_json_at(done, "options.alarm"));
+    bool is = mode && !strcmp(mode, "split");
+    json_decref(done);
+    return is;
 }
 
 /* "OUT/segment_0000 (frames 0 to 6), ...", as many as there is room for. */
@@ -176,7 +165,7 @@ npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alo
                            "(neupig run INPUT -o NEW --segments auto --frames FIRST:), "
                            "or all of them again (--restart)",
                            folder, json_array_size(list), verb);
-    } else if (is_alone && is_part(folder)) {
+    } else if (is_alone && !list && is_part(folder)) {
         status = npg_error(NPG_USAGE,
                            "%s is one segment of a capture; neupig %s would separate it from the others: "
                            "run the frames that came later into a folder of their own",

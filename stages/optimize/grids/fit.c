@@ -304,34 +304,21 @@ static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
     return status ? status : take_ties(fit, frames);
 }
 
-static npg_status begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key, size_t batch)
-{
-    npg_mlp_shape shape = shape_of(&fit->settings.grid);
-    fit->frame_count = count;
-    NPG_TRY(alloc_window(fit, count));
-    sort_outward(fit, frames, count, key);
-    NPG_TRY(npg_mlp_open(&fit->mlp, fit->device, &shape, fit->rows, count, batch));
-    return npg_buffer_write(&fit->mlp.params, 0, fit->params, npg_mlp_param_count(&shape) * sizeof(float));
-}
-
-npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key)
+npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key,
+                         npg_fit_measure *measure, void *user)
 {
     NPG_REQUIRE(fit && frames && count);
-    close_window(fit);
-    fit->measure = NULL;
-    NPG_TRY(begin(fit, frames, count, key, count < BATCH ? count : BATCH));
-    return open_targets(fit, frames);
-}
-
-npg_status npg_fit_begin_measured(npg_fit *fit, const npg_fit_frame *frames, size_t count,
-                                  npg_fit_measure *measure, void *user)
-{
-    NPG_REQUIRE(fit && frames && count && measure);
+    npg_mlp_shape shape = shape_of(&fit->settings.grid);
     close_window(fit);
     fit->measure = measure;
     fit->user = user;
-    NPG_TRY(begin(fit, frames, count, frames[0].index, count));
-    return open_motion_on(fit, NULL);
+    fit->frame_count = count;
+    NPG_TRY(alloc_window(fit, count));
+    sort_outward(fit, frames, count, key);
+    NPG_TRY(npg_mlp_open(&fit->mlp, fit->device, &shape, fit->rows, count,
+                         measure || count < BATCH ? count : BATCH));
+    NPG_TRY(npg_buffer_write(&fit->mlp.params, 0, fit->params, npg_mlp_param_count(&shape) * sizeof(float)));
+    return measure ? open_motion_on(fit, NULL) : open_targets(fit, frames);
 }
 
 void npg_time_code(float *codes, const double *times, size_t count, size_t frequencies)

@@ -55,12 +55,9 @@ npg_status npg_fit_open(npg_fit **fit, npg_device *device, const npg_fit_setting
 void npg_fit_close(npg_fit **fit);
 
 /* Begin a window.  key: index of the frame where the confidence is 1 (the window's frame nearest to it counts
- * as the key when it is not among them). */
-npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key);
-
-/* The same for frames that have times alone, whose loss is `measure`'s. */
-npg_status npg_fit_begin_measured(npg_fit *fit, const npg_fit_frame *frames, size_t count,
-                                  npg_fit_measure *measure, void *user);
+ * as the key when it is not among them).  measure: NULL, or frames have times alone, and their loss is its. */
+npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key,
+                         npg_fit_measure *measure, void *user);
 
 /* The confidence and the last learning rates (as a share of the first) from now on. */
 void npg_fit_set_pace(npg_fit *fit, npg_confidence confidence, double rate_end);

@@ -162,7 +162,7 @@ static npg_status begin(grids *g, const npg_problem *problem)
         frames[t] = (npg_fit_frame){
             .index = problem->frames[t].index,
             .time = npg_grids_time(&g->facts->plan, NPG_GRIDS_SPAN, problem->frames[t].index)};
-    npg_status status = npg_fit_begin_measured(g->fit, frames, problem->count, measure, g);
+    npg_status status = npg_fit_begin(g->fit, frames, problem->count, frames[0].index, measure, g);
     if (!status) status = npg_fit_run(g->fit, 0, 0, NULL, NULL);
     for (size_t t = 0; t < problem->count && !status; t++)
         status = npg_fit_vertices(g->fit, g->before + t * s, t);

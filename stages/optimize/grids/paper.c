@@ -160,7 +160,7 @@ static npg_status open_frame(opening *o)
         frames[i].tie = o->poses + places[i] * size;
     }
     frames[count] = frame_of(o->p, place_of(o, o->known));
-    NPG_TRY(npg_fit_begin(o->probe, frames, count + 1, o->p->facts->plan.key));
+    NPG_TRY(npg_fit_begin(o->probe, frames, count + 1, o->p->facts->plan.key, NULL, NULL));
     NPG_TRY(npg_fit_run(o->probe, 0, OPEN_EPOCHS, watch_epoch, o->p));
     NPG_TRY(npg_fit_vertices(o->probe, o->poses + o->known * size, count));
     o->p->opened += OPEN_EPOCHS;
@@ -188,7 +188,7 @@ static npg_status begin(paper *p)
     npg_fit_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, p->problem->count, sizeof *frames));
     for (size_t t = 0; t < p->problem->count; t++) frames[t] = frame_of(p, t);
-    npg_status status = npg_fit_begin(p->fit, frames, p->problem->count, p->facts->plan.key);
+    npg_status status = npg_fit_begin(p->fit, frames, p->problem->count, p->facts->plan.key, NULL, NULL);
     npg_release(&frames);
     return status;
 }
