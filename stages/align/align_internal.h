@@ -245,9 +245,9 @@ void npg_pose_map_close(npg_pose_map *map);
  * them. */
 void npg_pose_map_apply(const npg_pose_map *map, const npg_tracker *to, double *out, const double *pose);
 
-/* As one block for a state on disk, and back (NPG_BAD_INPUT).  *bytes is owned by the caller. */
-npg_status npg_pose_map_pack(const npg_pose_map *map, unsigned char **bytes, size_t *size);
-npg_status npg_pose_map_unpack(npg_pose_map *map, const unsigned char *bytes, size_t size);
+/* As blocks of a state on disk, and back (NPG_BAD_INPUT); count 0: it has none. */
+npg_status npg_pose_map_save(const npg_pose_map *map, npg_store *store);
+npg_status npg_pose_map_load(npg_pose_map *map, const npg_record *record);
 
 /* Resume points: what stage align needs behind the last frame that a window waits for, until the state of that
  * window is written.  By then the stage is at work on later frames.  Any thread. */

@@ -8,8 +8,7 @@
 
 #define BLOCK_POSE  "pose"        /* of a record of a frame                              */
 #define BLOCK_STATE "state"       /* of one of a group                                   */
-#define BLOCK_MAP   "align.map"   /* of a state: from the nodes of poses to this reference's */
-#define BLOCK_OF    "align.poses" /* and what these poses are of                         */
+#define BLOCK_OF    "align.poses" /* of a state: what the poses of its map are of        */
 
 /* What stays between two passes. */
 typedef struct between {
@@ -47,11 +46,9 @@ static npg_status restore_known(npg_pose_cache *c, const npg_worker *worker)
 {
     npg_job *job = npg_job_of(worker);
     const npg_record *state = npg_job_state(job);
-    size_t size;
-    const unsigned char *map = npg_record_find(state, BLOCK_MAP, &size);
-    if (!map) return NPG_OK; /* the reference is the keyframe's own */
+    NPG_TRY(npg_pose_map_load(&c->map, state));
+    if (!c->map.count) return NPG_OK; /* the reference is the keyframe's own */
     NPG_TRY(npg_record_get(state, BLOCK_OF, &c->known_of, sizeof c->known_of));
-    NPG_TRY(npg_pose_map_unpack(&c->map, map, size));
     if (c->map.count != c->node_count)
         return npg_error(NPG_BAD_INPUT, "the state to resume from has poses for %zu nodes, not %zu",
                          c->map.count, c->node_count);
@@ -196,12 +193,7 @@ npg_status npg_pose_cache_leave(npg_pose_cache *c, npg_worker *worker, npg_track
 
 npg_status npg_pose_cache_save(const npg_pose_cache *c, npg_store *out)
 {
-    unsigned char *bytes;
-    size_t size;
     if (!c->known) return NPG_OK;
     NPG_TRY(npg_store_put(out, BLOCK_OF, &c->known_of, sizeof c->known_of));
-    NPG_TRY(npg_pose_map_pack(&c->map, &bytes, &size));
-    npg_status status = npg_store_put(out, BLOCK_MAP, bytes, size);
-    npg_release(&bytes);
-    return status;
+    return npg_pose_map_save(&c->map, out);
 }

@@ -84,26 +84,34 @@ void npg_pose_map_apply(const npg_pose_map *map, const npg_tracker *to, double *
     }
 }
 
-/* ---- as a block: counts, nodes, weights, positions ---- */
+/* ---- as blocks ---- */
 
-npg_status npg_pose_map_pack(const npg_pose_map *map, unsigned char **bytes, size_t *size)
+#define BLOCK_MAP "align.map" /* counts */
+
+enum { ARRAYS = 3 };
+
+static void list_arrays(npg_store_array list[ARRAYS], const npg_pose_map *map)
+{
+    const npg_store_array all[ARRAYS] = {
+        {"align.nodes", offsetof(npg_pose_map, node), map->count, sizeof *map->node},
+        {"align.weights", offsetof(npg_pose_map, weight), map->count, sizeof *map->weight},
+        {"align.places", offsetof(npg_pose_map, old_pos), map->old_count, 3 * sizeof(float)}};
+    memcpy(list, all, sizeof all);
+}
+
+npg_status npg_pose_map_save(const npg_pose_map *map, npg_store *store)
 {
     const uint64_t counts[2] = {map->count, map->old_count};
-    size_t nodes = map->count * sizeof *map->node, weights = map->count * sizeof *map->weight,
-           places = map->old_count * 3 * sizeof(float);
-    *size = sizeof counts + nodes + weights + places;
-    NPG_TRY(npg_alloc(bytes, NPG_FOR_FIT, *size));
-    unsigned char *at = *bytes;
-    memcpy(at, counts, sizeof counts);
-    memcpy(at += sizeof counts, map->node, nodes);
-    memcpy(at += nodes, map->weight, weights);
-    memcpy(at + weights, map->old_pos, places);
-    return NPG_OK;
+    npg_store_array list[ARRAYS];
+    list_arrays(list, map);
+    NPG_TRY(npg_store_put(store, BLOCK_MAP, counts, sizeof counts));
+    return npg_store_put_arrays(store, map, list, ARRAYS);
 }
 
 /* Every new node hangs on old ones that are there, on one at least. */
 static bool hangs_well(const npg_pose_map *map)
 {
+    if (!map->node || !map->weight || !map->old_pos) return false;
     for (size_t k = 0; k < map->count; k++)
         for (int b = 0; b < NPG_GRAPH_BIND; b++) {
             uint32_t old = map->node[k][b];
@@ -112,24 +120,20 @@ static bool hangs_well(const npg_pose_map *map)
     return true;
 }
 
-npg_status npg_pose_map_unpack(npg_pose_map *map, const unsigned char *bytes, size_t size)
+npg_status npg_pose_map_load(npg_pose_map *map, const npg_record *record)
 {
-    uint64_t counts[2] = {0, 0};
+    uint64_t counts[2];
+    size_t size;
+    npg_store_array list[ARRAYS];
     *map = (npg_pose_map){0};
-    if (size >= sizeof counts) memcpy(counts, bytes, sizeof counts);
-    size_t each = sizeof *map->node + sizeof *map->weight, place = 3 * sizeof(float);
-    bool is_sane = counts[0] && counts[0] < size / each + 1 && counts[1] < size / place + 1;
-    if (!is_sane || size != sizeof counts + counts[0] * each + counts[1] * place)
-        return npg_error(NPG_BAD_INPUT, "the state to resume from has no poses to start from");
-    npg_status status = alloc_map(map, counts[0], counts[1]);
-    if (!status) {
-        const unsigned char *at = bytes + sizeof counts;
-        memcpy(map->node, at, counts[0] * sizeof *map->node);
-        memcpy(map->weight, at += counts[0] * sizeof *map->node, counts[0] * sizeof *map->weight);
-        if (counts[1]) memcpy(map->old_pos, at + counts[0] * sizeof *map->weight, counts[1] * place);
-        if (!hangs_well(map))
-            status = npg_error(NPG_BAD_INPUT, "the state to resume from hangs nodes on poses that it lacks");
-    }
+    if (!npg_record_find(record, BLOCK_MAP, &size)) return NPG_OK;
+    NPG_TRY(npg_record_get(record, BLOCK_MAP, counts, sizeof counts));
+    map->count = counts[0];
+    map->old_count = counts[1];
+    list_arrays(list, map);
+    npg_status status = npg_record_get_arrays(record, map, list, ARRAYS, NPG_FOR_FIT);
+    if (!status && !hangs_well(map))
+        status = npg_error(NPG_BAD_INPUT, "the state to resume from hangs nodes on poses that it lacks");
     if (status) npg_pose_map_close(map);
     return status;
 }

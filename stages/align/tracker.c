@@ -219,17 +219,14 @@ static void bind_face_point(pull *p, const npg_tracker *t, const npg_surface_hit
 /* arm = rotation d. */
 static void turn_arm(double arm[3], const double *rotation, const double d[3])
 {
-    for (int i = 0; i < 3; i++) {
-        arm[i] = 0;
-        for (int c = 0; c < 3; c++) arm[i] += rotation[3 * i + c] * d[c];
-    }
+    for (int i = 0; i < 3; i++) arm[i] = npg_vec3_dot(rotation + 3 * i, d);
 }
 
 /* rotation (point - node). */
 static void set_arm(double arm[3], const double *rotation, const float *point, const float *node)
 {
-    const double d[3] = {(double)point[0] - (double)node[0], (double)point[1] - (double)node[1],
-                         (double)point[2] - (double)node[2]};
+    double d[3];
+    npg_vec3_between(d, node, point);
     turn_arm(arm, rotation, d);
 }
 
