@@ -301,38 +301,25 @@ static npg_status init(npg_worker *worker)
     return npg_worker_facts(worker)->is_resumed ? restore(worker) : NPG_OK;
 }
 
-/* In a fusing pass: whether the reference explains the capture to its ends, so that what all frames saw may
- * be taken together. */
-static npg_status watch_frame(npg_worker *worker, npg_frame *frame)
+/* In a fusing pass only to know whether the reference explains the capture to its ends, so that what all frames
+ * saw may be taken together. */
+static npg_status see_frame(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
+    bool is_judged = npg_worker_pass(worker) == NPG_PASS_SOLVE;
     frame->figures = no_figures();
     frame->is_shared = npg_topology_is_shared(&state->watch, npg_worker_facts(worker), frame->index);
-    if (frame->vert_unit) NPG_TRY(measure_frame(worker, frame));
+    if (frame->vert_unit && (!is_judged || frame->fields & NPG_FIELD_VERTICES))
+        NPG_TRY(measure_frame(worker, frame));
+    if (is_judged) frame->fields |= NPG_FIELD_FIGURES;
+    if (is_judged) NPG_TRY(take_frame(worker, frame, true));
     return npg_topology_add(&state->watch, worker, frame);
-}
-
-static npg_status watch_chunk(npg_worker *worker, npg_chunk *chunk)
-{
-    for (size_t i = 0; i < npg_chunk_count(chunk); i++)
-        NPG_TRY(watch_frame(worker, npg_chunk_frame(chunk, i)));
-    return NPG_OK;
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
-    evaluate_state *state = npg_worker_state(worker);
-    if (npg_worker_pass(worker) == NPG_PASS_FUSE) return watch_chunk(worker, *chunk);
-    for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
-        npg_frame *frame = npg_chunk_frame(*chunk, i);
-        bool has_mesh = (frame->fields & NPG_FIELD_VERTICES) && frame->vert_unit;
-        frame->figures = no_figures();
-        frame->fields |= NPG_FIELD_FIGURES;
-        frame->is_shared = npg_topology_is_shared(&state->watch, npg_worker_facts(worker), frame->index);
-        if (has_mesh) NPG_TRY(measure_frame(worker, frame));
-        NPG_TRY(take_frame(worker, frame, true));
-        NPG_TRY(npg_topology_add(&state->watch, worker, frame));
-    }
+    for (size_t i = 0; i < npg_chunk_count(*chunk); i++)
+        NPG_TRY(see_frame(worker, npg_chunk_frame(*chunk, i)));
     return NPG_OK;
 }
 
