@@ -88,11 +88,11 @@ void npg_pose_map_apply(const npg_pose_map *map, const npg_tracker *to, double *
 
 #define BLOCK_MAP "align.map" /* counts */
 
-enum { ARRAYS = 3 };
+enum { MAP_PARTS = 3 };
 
-static void list_arrays(npg_store_array list[ARRAYS], const npg_pose_map *map)
+static void list_arrays(npg_store_array list[MAP_PARTS], const npg_pose_map *map)
 {
-    const npg_store_array all[ARRAYS] = {
+    const npg_store_array all[MAP_PARTS] = {
         {"align.nodes", offsetof(npg_pose_map, node), map->count, sizeof *map->node},
         {"align.weights", offsetof(npg_pose_map, weight), map->count, sizeof *map->weight},
         {"align.places", offsetof(npg_pose_map, old_pos), map->old_count, 3 * sizeof(float)}};
@@ -102,10 +102,10 @@ static void list_arrays(npg_store_array list[ARRAYS], const npg_pose_map *map)
 npg_status npg_pose_map_save(const npg_pose_map *map, npg_store *store)
 {
     const uint64_t counts[2] = {map->count, map->old_count};
-    npg_store_array list[ARRAYS];
+    npg_store_array list[MAP_PARTS];
     list_arrays(list, map);
     NPG_TRY(npg_store_put(store, BLOCK_MAP, counts, sizeof counts));
-    return npg_store_put_arrays(store, map, list, ARRAYS);
+    return npg_store_put_arrays(store, map, list, MAP_PARTS);
 }
 
 /* Every new node hangs on old ones that are there, on one at least. */
@@ -124,14 +124,14 @@ npg_status npg_pose_map_load(npg_pose_map *map, const npg_record *record)
 {
     uint64_t counts[2];
     size_t size;
-    npg_store_array list[ARRAYS];
+    npg_store_array list[MAP_PARTS];
     *map = (npg_pose_map){0};
     if (!npg_record_find(record, BLOCK_MAP, &size)) return NPG_OK;
     NPG_TRY(npg_record_get(record, BLOCK_MAP, counts, sizeof counts));
     map->count = counts[0];
     map->old_count = counts[1];
     list_arrays(list, map);
-    npg_status status = npg_record_get_arrays(record, map, list, ARRAYS, NPG_FOR_FIT);
+    npg_status status = npg_record_get_arrays(record, map, list, MAP_PARTS, NPG_FOR_FIT);
     if (!status && !hangs_well(map))
         status = npg_error(NPG_BAD_INPUT, "the state to resume from hangs nodes on poses that it lacks");
     if (status) npg_pose_map_close(map);
