@@ -13,6 +13,7 @@
 #define STRIDE_MOST  3  /* frames: the tracker must find from one to the next */
 
 #define DRAFT_FACES 3000
+#define DRAFT_DEPTH 7 /* of the octree */
 
 /* ---- which frames ---- */
 
@@ -37,14 +38,15 @@ void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, b
 
 /* ---- the draft of a candidate ---- */
 
-static npg_status draft_from(npg_mesh **mesh, const npg_candidate_cloud *cloud, float *normals,
-                             double spacing, const npg_poisson_settings *settings)
+static npg_status draft_from(npg_mesh **mesh, const npg_candidate_cloud *cloud, double spacing,
+                             const npg_poisson_settings *settings)
 {
-    size_t moved, turned;
+    size_t moved;
     npg_pieces pieces;
     npg_mending mending;
     double share;
-    NPG_TRY(npg_resurface(mesh, &moved, &turned, normals, cloud->fit, cloud->fit_count, spacing, settings));
+    NPG_TRY(
+        npg_poisson_apart(mesh, &moved, cloud->fit, cloud->fit_normals, cloud->fit_count, spacing, settings));
     /* What sensors did not see is none of its surface. */
     if (cloud->sensor_count) NPG_TRY(npg_mesh_trim(mesh, &share, cloud->fit, cloud->fit_count, 2 * spacing));
     NPG_TRY(npg_mesh_keep_main(mesh, &pieces, cloud->sensor_count ? HUGE_VAL : 1));
@@ -57,13 +59,8 @@ static npg_status make_draft(npg_mesh **mesh, const npg_candidate_cloud *cloud, 
                              const npg_poisson_settings *settings)
 {
     npg_poisson_settings quick = *settings;
-    npg_arena scratch = {.purpose = NPG_FOR_MESH};
-    if (quick.depth > NPG_DRAFT_DEPTH) quick.depth = NPG_DRAFT_DEPTH;
-    *mesh = NULL;
-    float *normals = npg_arena_copy(&scratch, cloud->fit_normals, cloud->fit_count, 3 * sizeof(float));
-    npg_status status = npg_arena_status(&scratch);
-    if (!status) status = draft_from(mesh, cloud, normals, spacing, &quick);
-    npg_arena_release(&scratch);
+    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    npg_status status = draft_from(mesh, cloud, spacing, &quick);
     if (status) npg_mesh_unref(mesh);
     return status;
 }

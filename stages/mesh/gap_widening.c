@@ -229,3 +229,19 @@ npg_status npg_gaps_bring_back(const npg_gap_widening *widening, npg_mesh *mesh)
     npg_arena_release(&scratch);
     return status;
 }
+
+npg_status npg_poisson_apart(npg_mesh **mesh, size_t *moved, const float *points, const float *normals,
+                             size_t n, double spacing, const npg_poisson_settings *settings)
+{
+    npg_gap_widening gaps;
+    *mesh = NULL;
+    *moved = 0;
+    if (settings->gaps == NPG_GAPS_KEPT) return npg_poisson(mesh, points, normals, n, settings);
+    NPG_TRY(npg_gaps_widen(&gaps, points, normals, n, spacing, settings->gaps));
+    *moved = gaps.moved;
+    npg_status status = npg_poisson(mesh, gaps.shifted, normals, n, settings);
+    if (!status) status = npg_gaps_bring_back(&gaps, *mesh);
+    if (status) npg_mesh_unref(mesh);
+    npg_gaps_close(&gaps);
+    return status;
+}

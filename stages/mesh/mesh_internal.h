@@ -53,7 +53,7 @@ void npg_point_set_close(npg_point_set *set);
  * In this order:
  *
  *     noisy points are smoothed, and Poisson's surface drawn through them, in which parts that
- *         nearly touch are held apart (npg_resurface())
+ *         nearly touch are held apart (npg_poisson_apart())
  *     of its pieces the main one is kept, and what belongs to it
  *     what lies far from every point is trimmed off; of what no point saw, all of it, or it is drawn tight
  *         between what was seen and out of empty space (membrane fairing)
@@ -120,8 +120,7 @@ npg_status npg_gaps_widen(npg_gap_widening *widening, const float *points, const
                           double spacing, npg_gap_way way);
 void npg_gaps_close(npg_gap_widening *widening);
 
-/* Move the vertices of a mesh made from the shifted points back.  normals may have been
- * turned since.  NPG_MEMORY. */
+/* Move the vertices of a mesh made from the shifted points back.  NPG_MEMORY. */
 npg_status npg_gaps_bring_back(const npg_gap_widening *widening, npg_mesh *mesh);
 
 /* Densify: points between those of thin parts.

@@ -49,19 +49,17 @@ static npg_status smooth(reconstruction *r)
 }
 
 /* Poisson through the points and what lies between those of thin parts. */
-static npg_status draw_through(reconstruction *r, size_t *moved, size_t *turned,
-                               const npg_poisson_settings *settings)
+static npg_status draw_through(reconstruction *r, size_t *moved, const npg_poisson_settings *settings)
 {
     npg_point_set *p = r->set;
     float *points, *normals;
     size_t count;
     /* noisy normals do not say what lies between, nor those that were estimated across both sides */
     if (r->is_rough || !p->has_given_normals)
-        return npg_resurface(&r->mesh, moved, turned, p->normals, p->points, p->count, p->spacing, settings);
+        return npg_poisson_apart(&r->mesh, moved, p->points, p->normals, p->count, p->spacing, settings);
     NPG_TRY(npg_cloud_densify(&points, &normals, &count, p->points, p->normals, p->count, p->spacing));
     npg_mesh_note_count(r->worker, "points_between", count - p->count);
-    npg_status status = npg_resurface(&r->mesh, moved, turned, normals, points, count, p->spacing, settings);
-    if (!status) memcpy(p->normals, normals, 3 * p->count * sizeof *normals); /* their sides are mended */
+    npg_status status = npg_poisson_apart(&r->mesh, moved, points, normals, count, p->spacing, settings);
     npg_release(&points);
     npg_release(&normals);
     return status;
@@ -75,11 +73,10 @@ static npg_status draw_surface(reconstruction *r)
         settings.depth = GROWING_DEPTH;
     if (!p->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
-    size_t turned, moved;
+    size_t moved;
     NPG_TRY(smooth(r));
-    NPG_TRY(draw_through(r, &moved, &turned, &settings));
+    NPG_TRY(draw_through(r, &moved, &settings));
     npg_mesh_note_count(r->worker, "points_held_apart", moved);
-    npg_mesh_note_count(r->worker, "normals_turned", turned);
     npg_mesh_note(r->worker, "poisson_s", npg_clock_s() - since);
     npg_mesh_note_count(r->worker, "faces_reconstructed", r->mesh->face_count);
     return NPG_OK;

@@ -49,7 +49,7 @@ typedef enum npg_gap_way { NPG_GAPS_TIGHT, NPG_GAPS_LOOSE, NPG_GAPS_KEPT } npg_g
 typedef struct npg_poisson_settings {
     int depth;           /* of the octree, 10                     */
     double point_weight; /* of the screening term, 10             */
-    npg_gap_way gaps;    /* npg_resurface(): how          */
+    npg_gap_way gaps;    /* npg_poisson_apart(): how      */
     double time_limit_s;
     size_t memory_limit; /* bytes of address space of the child; 0: none */
     const char *program; /* NULL: neupig-poisson                         */
@@ -68,20 +68,10 @@ npg_poisson_settings npg_poisson_settings_of(const npg_options *options);
 npg_status npg_poisson(npg_mesh **mesh, const float *points, const float *normals, size_t point_count,
                        const npg_poisson_settings *settings);
 
-/* Resurface: Poisson twice, with the sides of normals that the first surface says.
- *
- * Where a patch of normals is on the wrong side, the surface that Poisson draws through it faces the other
- * way at many of its points: those take the surface's side and the next surface is better.  Based on: F. Hou
- * et al., Iterative Poisson Surface Reconstruction (iPSR) for Unoriented Points, 2022.  We turn normals only,
- * and begin from oriented ones: one coarse surface is enough. */
-
-#define NPG_DRAFT_DEPTH 7 /* of the octree of surfaces that are looked at, and not delivered */
-
-/* As npg_poisson(), with normals (N x 3) mended in place, and parts that nearly touch kept from being joined (gap
- * widening): *turned counts the normals whose side changed, *moved the points that were moved for it.  spacing:
- * npg_cloud_spacing().  The first surface has NPG_DRAFT_DEPTH, and is the last where no more is asked for. */
-npg_status npg_resurface(npg_mesh **mesh, size_t *moved, size_t *turned, float *normals, const float *points,
-                         size_t point_count, double spacing, const npg_poisson_settings *settings);
+/* As npg_poisson(), and parts that nearly touch are kept from being joined (gap widening): *moved counts the points
+ * that were moved for it.  spacing: npg_cloud_spacing(). */
+npg_status npg_poisson_apart(npg_mesh **mesh, size_t *moved, const float *points, const float *normals,
+                             size_t point_count, double spacing, const npg_poisson_settings *settings);
 
 /* Denoise.  N x 3 arrays; NPG_MEMORY.
  *

@@ -142,11 +142,10 @@ static int64_t handles_of_legs(double feet, npg_gap_way way, size_t *moved)
     const npg_poisson_settings settings = {.depth = 7, .point_weight = 4, .time_limit_s = 60, .gaps = way};
     npg_frame frame = {0};
     npg_mesh *mesh;
-    size_t turned;
     int64_t handles;
     assert_int_equal(legs_frame(&frame, feet, 5), NPG_OK);
     assert_int_equal(
-        npg_resurface(&mesh, moved, &turned, frame.normals, frame.pos_local, LEGS_POINTS, 0.05, &settings),
+        npg_poisson_apart(&mesh, moved, frame.pos_local, frame.normals, LEGS_POINTS, 0.05, &settings),
         NPG_OK);
     assert_int_equal(npg_mesh_handles(&handles, mesh), NPG_OK);
     npg_mesh_unref(&mesh);
