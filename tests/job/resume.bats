@@ -169,7 +169,6 @@ same() {
     cp -r whole older
     sed -i '/"layout"/d' older/job/job.json
     mv older/job/store.npg older/job/window_000002.npg
-    touch older/job/poses.bin older/job/motion_000000.npg
     run "$NEUPIG" run capture/points -o older "${small[@]}"
     echo "$output"
     [ "$status" -eq 2 ]
