@@ -67,8 +67,9 @@ typedef struct npg_brief {
                                all frames and gathers their points for the next one */
     bool takes_gathered; /* the next reference is made from what was gathered, and the poses found are good to
                                start from; false: from the keyframe alone, and frames are followed anew */
-    bool trims_only;     /* ... is the one so far, without what the frames that were followed contradict */
-    bool is_side;        /* the reference is a side of the body, of which sensors see a part in a frame */
+    int64_t gathers_from, gathers_to; /* index of the first and last frame whose points are gathered */
+    bool trims_only;        /* ... is the one so far, without what the frames that were followed contradict */
+    bool is_side;           /* the reference is a side of the body, of which sensors see a part in a frame */
     int64_t growing_passes; /* through which a reference that was one side of the body has grown so far ... */
     bool is_growing;        /* ... and goes on to: the next one is not closed                               */
     double explained_least; /* share of a frame's points that a growing reference that bends must have places

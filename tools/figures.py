@@ -170,7 +170,7 @@ TABLES = {
         coded(keys_of_method(preset="paper", smoothing="screened"), keys_of_method(preset="paper", hold_apart="loose"), PAPER)),
     "apart": table_of_captures(
         ("options",), ("dancer40", "horse17"), ("CD", "Corr"),
-        coded(keys_of_method(hold_apart="no"), keys_of_method(hold_apart="loose"), "")),
+        coded(keys_of_method(hold_apart="no"), "")),
     "quality": table_of_captures(
         ("options",), ("dancer17", "horse17"), ("CD", "Corr", "cpu_s"),
         coded("", FEW_NODES, keys_of_method(align_nodes=400, epochs=0), ALIGNED)),

@@ -243,7 +243,7 @@ static void process_waiting(side *s, int direction, bool is_end)
         process_frame(s, &s->waiting[done++]);
     }
     s->waiting_count -= done;
-    memmove(s->waiting, s->waiting + done, s->waiting_count * sizeof *s->waiting);
+    if (s->waiting_count) memmove(s->waiting, s->waiting + done, s->waiting_count * sizeof *s->waiting);
 }
 
 /* Those nearest the keyframe come first. */

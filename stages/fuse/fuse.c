@@ -244,7 +244,9 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
 static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
 {
     cloud c = {.arena.purpose = NPG_FOR_MESH};
+    const npg_brief *brief = &npg_worker_facts(worker)->brief;
     if (frame->is_skipped || !frame->point_count) return NPG_OK;
+    if (frame->index < brief->gathers_from || frame->index > brief->gathers_to) return NPG_OK;
     npg_status status = gather(worker, &c, frame);
     npg_arena_release(&c.arena);
     return npg_error_prefix(status, "frame %lld", (long long)frame->number);
@@ -395,6 +397,9 @@ static npg_status settle(npg_worker *worker)
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return begin(worker);
     const npg_pass_result result = {.unreached_count = facts->unreached_count,
                                     .has_changed = npg_facts_has_changed(facts),
+                                    .explained_from = facts->has_changed[1] ? facts->changed_at[1] + 1 : 0,
+                                    .explained_to = facts->has_changed[0] ? facts->changed_at[0] - 1
+                                                                          : facts->planned_count - 1,
                                     .is_side = s->grow_dist > 0,
                                     .has_images = s->votes != NULL};
     *npg_own(worker, brief) = npg_reference_next(npg_worker_kept(worker), &result);

@@ -11,15 +11,9 @@
 #define NEIGHBOURS    48   /* in which a facing point is looked for */
 #define ACROSS        0.5f /* cosine of a normal and the way across the gap */
 #define SMOOTH_ROUNDS 3
-#define BACK_OVER     6 /* points around a vertex */
-
-typedef struct manner {
-    double wide;       /* a gap that survives, in spacings                         */
-    bool is_one_sided; /* a vertex goes by points on its own side of the gap alone */
-    int rounds;        /* times that the surface is then drawn to its points       */
-} manner;
-
-static const manner manners[] = {[NPG_GAPS_TIGHT] = {1.2, true, 2}, [NPG_GAPS_LOOSE] = {1.5, false, 0}};
+#define WIDE          1.2 /* a gap that survives, in spacings */
+#define BACK_ROUNDS   2   /* that the surface is drawn to its points */
+#define BACK_OVER     6   /* points around a vertex */
 
 /* ---- contact ---- */
 
@@ -80,7 +74,7 @@ static npg_status measure_pushes(float *push, const npg_gap_widening *widening)
     npg_status status = npg_neighbours_take(&near, &scratch, points, n, points, n, NEIGHBOURS);
     for (size_t i = 0; i < n && !status; i++)
         push[i] = push_of(i, near.index + NEIGHBOURS * i, near.dist_sq + NEIGHBOURS * i, points, normals, n,
-                          manners[widening->way].wide * widening->spacing);
+                          WIDE * widening->spacing);
     for (int round = 0; round < SMOOTH_ROUNDS && !status; round++) {
         smooth(smoothed, push, near.index, normals, n);
         memcpy(push, smoothed, n * sizeof(float));
@@ -90,15 +84,11 @@ static npg_status measure_pushes(float *push, const npg_gap_widening *widening)
 }
 
 npg_status npg_gaps_widen(npg_gap_widening *widening, const float *points, const float *normals, size_t n,
-                          double spacing, npg_gap_way way)
+                          double spacing)
 {
-    NPG_REQUIRE(n && spacing > 0 && way != NPG_GAPS_KEPT);
-    *widening = (npg_gap_widening){.points = points,
-                                   .normals = normals,
-                                   .count = n,
-                                   .spacing = spacing,
-                                   .way = way,
-                                   .arena.purpose = NPG_FOR_MESH};
+    NPG_REQUIRE(n && spacing > 0);
+    *widening = (npg_gap_widening){
+        .points = points, .normals = normals, .count = n, .spacing = spacing, .arena.purpose = NPG_FOR_MESH};
     float *push = npg_arena_take(&widening->arena, n, sizeof *push);
     widening->shift = npg_arena_take(&widening->arena, n, 3 * sizeof *widening->shift);
     widening->shifted = npg_arena_take(&widening->arena, n, 3 * sizeof *widening->shifted);
@@ -140,8 +130,7 @@ static void choose_around(around *to, const float *vert_normal, const uint32_t *
 {
     float scale = 0;
     for (size_t k = 0; k < NPG_POINTS_ASKED && near[k] < widening->count && to->count < BACK_OVER; k++) {
-        bool is_across = npg_vec3_dotf(vert_normal, widening->normals + 3 * (size_t)near[k]) <= 0;
-        if (is_across && manners[widening->way].is_one_sided) continue;
+        if (npg_vec3_dotf(vert_normal, widening->normals + 3 * (size_t)near[k]) <= 0) continue; /* across */
         if (!to->count) scale = dist_sq[k] + 1e-12f;
         to->weight[to->count] = scale / (dist_sq[k] + scale);
         to->point[to->count++] = near[k];
@@ -222,7 +211,7 @@ npg_status npg_gaps_bring_back(const npg_gap_widening *widening, npg_mesh *mesh)
     npg_status status = npg_arena_status(&scratch);
     if (!status) status = find_around(&w);
     if (!status) move(&w, widening->shift, -1);
-    for (int round = 0; round < manners[widening->way].rounds && !status; round++) {
+    for (int round = 0; round < BACK_ROUNDS && !status; round++) {
         status = measure_gaps(&w);
         if (!status) move(&w, w.gaps, 1);
     }
@@ -236,8 +225,8 @@ npg_status npg_poisson_apart(npg_mesh **mesh, size_t *moved, const float *points
     npg_gap_widening gaps;
     *mesh = NULL;
     *moved = 0;
-    if (settings->gaps == NPG_GAPS_KEPT) return npg_poisson(mesh, points, normals, n, settings);
-    NPG_TRY(npg_gaps_widen(&gaps, points, normals, n, spacing, settings->gaps));
+    if (!settings->holds_apart) return npg_poisson(mesh, points, normals, n, settings);
+    NPG_TRY(npg_gaps_widen(&gaps, points, normals, n, spacing));
     *moved = gaps.moved;
     npg_status status = npg_poisson(mesh, gaps.shifted, normals, n, settings);
     if (!status) status = npg_gaps_bring_back(&gaps, *mesh);

@@ -19,7 +19,7 @@ typedef struct mesh_state {
     npg_reconstruct_settings surface; /* but for `poisson`, which is made of the next three */
     int64_t depth;
     double point_weight;
-    int gaps; /* npg_gap_way */
+    bool holds_apart;
     double invented_max;
     bool is_made; /* the reference of this pass */
 } mesh_state;
@@ -35,10 +35,9 @@ static const npg_option mesh_options[] = {
         "How closely the Poisson surface follows the points"),
     NPG_KEY(FLAG,   "smooth",         AT(surface.smooth),   "yes",
         "Smooth the keyframe's points for the reconstruction when they are noisy"),
-    NPG_KEY(CHOICE, "hold-apart",     AT(gaps),             "tight", "tight|loose|no",
+    NPG_KEY(FLAG,   "hold-apart",     AT(holds_apart),      "yes",
         "Hold parts that nearly touch apart while the surface is made, so that they are not joined; "
-        "after that bring it back to its points (tight), "
-        "or nearly so, which leaves a little of the gap (loose)"),
+        "after that bring it back to its points"),
     NPG_ROW_INT(    "faces",          AT(surface.face_max), "20000", 16, 1e8,  NULL,
         "Faces of the reference mesh at most. And no more than 4 per point"),
     NPG_ROW_CHOICE( "unseen",         AT(surface.unseen),   "auto",  "auto|keep|trim",
@@ -55,7 +54,7 @@ static npg_poisson_settings poisson_settings(const mesh_state *s)
 {
     return (npg_poisson_settings){.depth = (int)s->depth,
                                   .point_weight = s->point_weight,
-                                  .gaps = (npg_gap_way)s->gaps,
+                                  .holds_apart = s->holds_apart,
                                   .time_limit_s = POISSON_TIME_S,
                                   .memory_limit = (size_t)POISSON_MEMORY_MIB << 20};
 }
@@ -342,9 +341,8 @@ static npg_status make_of_pass(npg_worker *worker, const npg_frame *key)
     mesh_state *s = npg_worker_state(worker);
     npg_fused *fused = npg_worker_take_fact(worker, &npg_fact_fused);
     if (fused && !npg_worker_facts(worker)->brief.takes_gathered) {
-        npg_worker_log(
-            worker, NPG_LOG_INFO, -1,
-            "the keyframe's surface does not explain all frames: the reference is made from it alone");
+        npg_worker_log(worker, NPG_LOG_INFO, -1,
+                       "the keyframe's surface does not explain all frames: what others show is left out");
         npg_fused_close(&fused);
     }
     if (key->is_skipped || !key->point_count)

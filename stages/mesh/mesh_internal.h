@@ -99,9 +99,9 @@ npg_status npg_reconstruct(npg_mesh **mesh, double *invented_share, npg_worker *
  *
  * g_i: distance to the nearest point that faces point i, normals against each other and the gap outside of both, h: the points' spacing, w: see
  * gap_widening.c.
- * The way back is not exact: a vertex goes by the mean of what the points around it went.  Tight, the surface
- * is then drawn to its points twice: each vertex by the mean of the gaps along the normals that the points
- * around it have to the surface.  Loose, it stays as it is, and the parts keep a little of their distance.
+ * The way back is not exact: a vertex goes by the mean of what the points around it, on its side of the gap, went.  So the
+ * surface is then drawn to its points twice: each vertex by the mean of the gaps along the normals that the points
+ * around it have to the surface.
  * Not in the paper. */
 
 /* N points and where they are for the reconstruction. */
@@ -109,7 +109,6 @@ typedef struct npg_gap_widening {
     const float *points, *normals; /* N x 3, loans; outward                               */
     size_t count;                  /* N                                                   */
     double spacing;                /* h, as npg_cloud_spacing() gives it                  */
-    npg_gap_way way;               /* tight or loose                                      */
     float *shift, *shifted;        /* N x 3: how far each point goes, and to where        */
     size_t moved;                  /* points that go at all                               */
     npg_arena arena;
@@ -117,7 +116,7 @@ typedef struct npg_gap_widening {
 
 /* NPG_MEMORY. */
 npg_status npg_gaps_widen(npg_gap_widening *widening, const float *points, const float *normals, size_t count,
-                          double spacing, npg_gap_way way);
+                          double spacing);
 void npg_gaps_close(npg_gap_widening *widening);
 
 /* Move the vertices of a mesh made from the shifted points back.  NPG_MEMORY. */

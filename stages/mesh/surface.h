@@ -43,13 +43,10 @@ void npg_fused_close(npg_fused **fused);
  * oriented normals, and may crash or exit: so the input is checked before, the process has limits, and the
  * answer is checked after. */
 
-/* How parts that nearly touch are kept from being joined (mesh_internal.h). */
-typedef enum npg_gap_way { NPG_GAPS_TIGHT, NPG_GAPS_LOOSE, NPG_GAPS_KEPT } npg_gap_way;
-
 typedef struct npg_poisson_settings {
     int depth;           /* of the octree, 10                     */
     double point_weight; /* of the screening term, 10             */
-    npg_gap_way gaps;    /* npg_poisson_apart(): how      */
+    bool holds_apart;    /* npg_poisson_apart(): parts that nearly touch */
     double time_limit_s;
     size_t memory_limit; /* bytes of address space of the child; 0: none */
     const char *program; /* NULL: neupig-poisson                         */

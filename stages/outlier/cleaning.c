@@ -119,12 +119,6 @@ npg_status npg_clean_duplicates(npg_frame *frame)
     return keep_first_of_cells(frame, &frame->cleaning.duplicate, 0);
 }
 
-npg_status npg_clean_voxels(npg_frame *frame, double side)
-{
-    NPG_REQUIRE(side > 0);
-    return keep_first_of_cells(frame, &frame->cleaning.thinned, side);
-}
-
 /* The number of cells that a surface takes goes with the inverse square of their side: each round uses that
  * to come nearer, aiming at 80 % of the most, and takes the geometric mean of a side with too many cells and
  * one with few enough where the estimate leaves that interval. */
@@ -158,7 +152,7 @@ npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
         if (count <= point_max) enough = cell_side;
     }
     *side = enough;
-    return npg_clean_voxels(frame, enough);
+    return keep_first_of_cells(frame, &frame->cleaning.thinned, enough);
 }
 
 /* ---- is it a body? ---- */

@@ -26,9 +26,6 @@ npg_status npg_clean_finite(npg_frame *frame);
 /* Of points at exactly one place keep the first. */
 npg_status npg_clean_duplicates(npg_frame *frame);
 
-/* Keep the first point of every cubic cell with this side (local units). */
-npg_status npg_clean_voxels(npg_frame *frame, double side);
-
 /* Thin by cells until at most point_max points are left (more than half of that, unless the cloud is stranger
  * than a surface).  *side is the side of the cells, 0 when there was nothing to do. */
 npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max);

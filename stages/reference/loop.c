@@ -13,8 +13,11 @@
 
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
 {
-    *loop = (npg_reference_loop){
-        .brief = {.rounds_left = rounds, .takes_gathered = true, .explained_least = EXPLAINED_FIRST}};
+    *loop = (npg_reference_loop){.brief = {.rounds_left = rounds,
+                                           .takes_gathered = true,
+                                           .gathers_from = INT64_MIN,
+                                           .gathers_to = INT64_MAX,
+                                           .explained_least = EXPLAINED_FIRST}};
     return loop->brief;
 }
 
@@ -43,9 +46,14 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
     brief->trims_only = loop->is_last_look;
     loop->is_last_look = !loop->is_last_look && !brief->rounds_left && result->is_side && result->has_images;
     brief->rounds_left += loop->is_last_look;
-    /* Parts that come, go or open belong to no common surface, and hiding them in one would silence the
-     * alarm.  A side of the body never explains all. */
+    /* A side of the body never explains all. */
     brief->is_side = result->is_side;
-    brief->takes_gathered = result->is_side || !result->has_changed;
+    brief->takes_gathered = result->is_side || !result->has_changed || loop->is_limited;
+    if (!brief->takes_gathered && result->explained_to > result->explained_from + 1) {
+        loop->is_limited = true;
+        brief->gathers_from = result->explained_from;
+        brief->gathers_to = result->explained_to;
+        brief->rounds_left++;
+    }
     return *brief;
 }

@@ -13,9 +13,10 @@
 /* What a pass came to. */
 typedef struct npg_pass_result {
     int64_t unreached_count; /* frames that see too much that the reference does not have, and those beyond */
-    bool has_changed;        /* it does not explain the capture to both its ends */
-    bool is_side;            /* it is a side of the body: what it lacks says nothing of how that is joined */
-    bool has_images;         /* frames can contradict it */
+    bool has_changed;        /* it does not explain the capture to both its ends ...    */
+    int64_t explained_from, explained_to; /* ... but from and to the frames of these indices */
+    bool is_side;    /* it is a side of the body: what it lacks says nothing of how that is joined */
+    bool has_images; /* frames can contradict it */
 } npg_pass_result;
 
 /* {0} before npg_reference_begin().  Nothing to close. */
@@ -24,12 +25,15 @@ typedef struct npg_reference_loop {
     int64_t unreached_before; /* of the pass before ...                             */
     int64_t in_vain;          /* ... and passes in a row that reached no more since */
     bool is_last_look;        /* the pass to come is walked for what it contradicts */
+    bool is_limited;          /* ... for what it explains alone                     */
 } npg_reference_loop;
 
 /* The brief of the first pass, of `rounds` that are to gather points. */
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds);
 
-/* The brief of the next one.  A side of the body grows until all frames are reached, or two passes in a row
+/* The brief of the next one.  Parts that come, go or open belong to no common surface, and hiding them in one would
+ * silence the alarm: where the reference does not explain all frames, those that it explains are followed once
+ * more and gathered alone, if there are three.  A side of the body grows until all frames are reached, or two passes in a row
  * that ask for the least have reached no more.  What has grown, or been taken from past its border by
  * a side that reaches all, is gathered once more: the last frames that were reached had nothing around them
  * yet, and what others see through there shows when it is followed. */

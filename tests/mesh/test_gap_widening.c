@@ -93,7 +93,7 @@ static void points_go_apart_and_the_surface_comes_back(void **state)
     size_t n = LEGS_POINTS;
     int64_t handles;
     assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK); /* a gap of 0.02 at the feet */
-    assert_int_equal(npg_gaps_widen(&apart, frame.pos_local, frame.normals, n, 0.05, NPG_GAPS_TIGHT), NPG_OK);
+    assert_int_equal(npg_gaps_widen(&apart, frame.pos_local, frame.normals, n, 0.05), NPG_OK);
     assert_in_range(apart.moved, 20, n / 3);
     for (size_t i = 0; i < n; i++) { /* nobody crosses over, and the feet go outward */
         bool is_inner = frame.normals[3 * i] * frame.pos_local[3 * i] < 0;
@@ -113,33 +113,11 @@ static void points_go_apart_and_the_surface_comes_back(void **state)
     npg_frame_clear(&frame);
 }
 
-/* Vertices that are the points themselves come back to within what their neighbours went differently. */
-static void loose_vertices_come_back_nearly(void **state)
-{
-    (void)state;
-    npg_frame frame = {0};
-    npg_gap_widening apart;
-    npg_mesh *mesh;
-    size_t n = LEGS_POINTS;
-    double error = 0;
-    assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK);
-    assert_int_equal(npg_gaps_widen(&apart, frame.pos_local, frame.normals, n, 0.05, NPG_GAPS_LOOSE), NPG_OK);
-    assert_in_range(apart.moved, 20, n / 3);
-    assert_int_equal(npg_mesh_open(&mesh, n, 0), NPG_OK);
-    memcpy(mesh->vert_pos, apart.shifted, 3 * n * sizeof(float));
-    assert_int_equal(npg_gaps_bring_back(&apart, mesh), NPG_OK);
-    for (size_t i = 0; i < 3 * n; i++)
-        error = fmax(error, fabs((double)mesh->vert_pos[i] - (double)frame.pos_local[i]));
-    assert_true(error < 0.02);
-    npg_mesh_unref(&mesh);
-    npg_gaps_close(&apart);
-    npg_frame_clear(&frame);
-}
-
 /* Handles of the legs' surface; the feet, welded, make one. */
-static int64_t handles_of_legs(double feet, npg_gap_way way, size_t *moved)
+static int64_t handles_of_legs(double feet, bool holds_apart, size_t *moved)
 {
-    const npg_poisson_settings settings = {.depth = 7, .point_weight = 4, .time_limit_s = 60, .gaps = way};
+    const npg_poisson_settings settings = {
+        .depth = 7, .point_weight = 4, .time_limit_s = 60, .holds_apart = holds_apart};
     npg_frame frame = {0};
     npg_mesh *mesh;
     int64_t handles;
@@ -158,13 +136,11 @@ static void feet_that_nearly_touch_are_joined_unless_held_apart(void **state)
     (void)state;
     size_t moved;
     for (double feet = 0.155; feet < 0.177; feet += 0.005) { /* gaps of a fifth of the spacing to all of it */
-        for (npg_gap_way way = NPG_GAPS_TIGHT; way < NPG_GAPS_KEPT; way++) {
-            assert_int_equal(handles_of_legs(feet, way, &moved), 0);
-            assert_true(moved > 0);
-        }
+        assert_int_equal(handles_of_legs(feet, true, &moved), 0);
+        assert_true(moved > 0);
         print_message("gap %.2f of the spacing: %zu points moved\n", 2 * (feet - 0.15) / 0.05, moved);
     }
-    assert_true(handles_of_legs(0.155, NPG_GAPS_KEPT, &moved) > 0);
+    assert_true(handles_of_legs(0.155, false, &moved) > 0);
     assert_int_equal(moved, 0);
 }
 
@@ -178,7 +154,7 @@ static void coming_back_needs_memory(void **state)
     assert_int_equal(legs_frame(&frame, 0.16, 5), NPG_OK);
     for (uint64_t i = 1; status && i < 60; i++) {
         npg_memory_fail_at(i, false);
-        status = npg_gaps_widen(&apart, frame.pos_local, frame.normals, LEGS_POINTS, 0.05, NPG_GAPS_TIGHT);
+        status = npg_gaps_widen(&apart, frame.pos_local, frame.normals, LEGS_POINTS, 0.05);
         if (!status) status = npg_gaps_bring_back(&apart, mesh);
         npg_memory_fail_at(0, false);
         assert_true(status == NPG_OK || status == NPG_MEMORY);
@@ -196,7 +172,6 @@ int main(void)
         cmocka_unit_test(handles_are_counted_with_and_without_a_border),
         cmocka_unit_test(twins_lie_across_their_edge),
         cmocka_unit_test(points_go_apart_and_the_surface_comes_back),
-        cmocka_unit_test(loose_vertices_come_back_nearly),
         cmocka_unit_test(feet_that_nearly_touch_are_joined_unless_held_apart),
         cmocka_unit_test(coming_back_needs_memory),
     };

@@ -57,20 +57,6 @@ static void duplicates_go(void **state)
     npg_frame_clear(&frame);
 }
 
-static void cells_keep_one_point(void **state)
-{
-    (void)state;
-    npg_frame frame;
-    open_frame(&frame, 20000, 3);
-    assert_int_equal(npg_clean_voxels(&frame, 0.1), NPG_OK);
-    assert_true(frame.point_count > 500 && frame.point_count < 3000);
-    assert_int_equal(frame.point_count + frame.cleaning.thinned, 20000);
-    size_t left = frame.point_count;
-    assert_int_equal(npg_clean_voxels(&frame, 0.1), NPG_OK);
-    assert_true(frame.point_count <= left);
-    npg_frame_clear(&frame);
-}
-
 static void too_many_points_are_thinned(void **state)
 {
     (void)state;
@@ -290,7 +276,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_not_a_number_goes),
                                        cmocka_unit_test(duplicates_go),
-                                       cmocka_unit_test(cells_keep_one_point),
                                        cmocka_unit_test(too_many_points_are_thinned),
                                        cmocka_unit_test(isolated_points_go_and_others_stay),
                                        cmocka_unit_test(frames_are_searched_together),

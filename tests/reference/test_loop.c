@@ -10,7 +10,10 @@
 
 static npg_brief next(npg_reference_loop *loop, int64_t unreached, bool has_changed)
 {
-    const npg_pass_result result = {.unreached_count = unreached, .has_changed = has_changed};
+    const npg_pass_result result = {.unreached_count = unreached,
+                                    .has_changed = has_changed,
+                                    .explained_from = 2,
+                                    .explained_to = has_changed ? 6 : 20};
     return npg_reference_next(loop, &result);
 }
 
@@ -37,13 +40,31 @@ static void every_round_is_walked_once(void **state)
     }
 }
 
-static void what_a_reference_does_not_explain_is_not_gathered(void **state)
+static void what_a_reference_explains_is_gathered_alone(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_reference_begin(&loop, 2);
-    assert_false(next(&loop, 0, true).takes_gathered);
-    assert_true(next(&loop, 0, false).takes_gathered); /* what the next pass says counts */
+    npg_brief brief = npg_reference_begin(&loop, 1);
+    assert_true(brief.gathers_from < 0 && brief.gathers_to > 1000);
+    brief = next(&loop, 0, true);
+    assert_false(brief.takes_gathered);
+    assert_int_equal(brief.rounds_left, 1); /* once more, of these frames */
+    assert_int_equal(brief.gathers_from, 2);
+    assert_int_equal(brief.gathers_to, 6);
+    brief = next(&loop, 0, true);
+    assert_true(brief.takes_gathered);
+    assert_int_equal(brief.rounds_left, 0);
+}
+
+static void too_few_explained_frames_are_no_reference(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 1);
+    const npg_pass_result result = {.has_changed = true, .explained_from = 5, .explained_to = 6};
+    npg_brief brief = npg_reference_next(&loop, &result);
+    assert_false(brief.takes_gathered);
+    assert_int_equal(brief.rounds_left, 0);
 }
 
 static void a_side_grows_until_all_is_reached_and_is_gathered_once_more(void **state)
@@ -140,7 +161,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_round_is_walked_once),
-        cmocka_unit_test(what_a_reference_does_not_explain_is_not_gathered),
+        cmocka_unit_test(what_a_reference_explains_is_gathered_alone),
+        cmocka_unit_test(too_few_explained_frames_are_no_reference),
         cmocka_unit_test(a_side_grows_until_all_is_reached_and_is_gathered_once_more),
         cmocka_unit_test(a_side_that_reaches_all_is_gathered_whatever_it_lacks),
         cmocka_unit_test(a_side_before_cameras_is_looked_at_once_more_and_trimmed),
