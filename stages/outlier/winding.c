@@ -25,8 +25,7 @@
 #define WIDTH_FIRST 1.2
 #define WIDTH_LAST  0.3
 #define WIDTH_NOISE 4.0 /* and no less than this many standard deviations of the noise */
-#define ASKED       8   /* one in so many points says how far a step should go                       */
-#define SHARE_LEAST 256 /* points that are worth a thread                                            */
+#define SHARE_LEAST 256 /* points that are worth a thread */
 
 typedef struct vectors { /* each coordinate by itself, as wide processors add */
     float *x, *y, *z;
@@ -100,8 +99,8 @@ typedef struct task {
     const field *f;
     const vectors *dipoles; /* number */
     enum { NUMBER, ADJOINT, OUTWARD } what;
-    const vectors *places; /* `count` of them, each `stride` after the other */
-    size_t count, stride, parts;
+    const vectors *places; /* `count` of them */
+    size_t count, parts;
     vectors out; /* number: x alone */
 } task;
 
@@ -111,8 +110,7 @@ static npg_status do_share(void *user, size_t part)
     const field *f = t->f;
     float soft = (float)(f->width * f->width), out[3] = {0};
     for (size_t i = part * t->count / t->parts; i < (part + 1) * t->count / t->parts; i++) {
-        size_t at = i * t->stride;
-        const float p[3] = {t->places->x[at], t->places->y[at], t->places->z[at]};
+        const float p[3] = {t->places->x[i], t->places->y[i], t->places->z[i]};
         if (t->what == NUMBER) {
             t->out.x[i] = sum_number(&f->at, t->dipoles, f->count, p, soft) / (4 * (float)M_PI);
             continue;
@@ -134,11 +132,9 @@ static npg_status do_all(task t)
     return npg_parallel(do_share, &t, t.parts);
 }
 
-/* At every `stride`th point. */
-static npg_status find_number(field *f, const vectors *dipoles, size_t stride)
+static npg_status find_number(field *f, const vectors *dipoles)
 {
-    size_t count = (f->count + stride - 1) / stride;
-    return do_all((task){f, dipoles, NUMBER, &f->at, count, stride, 0, {f->number, NULL, NULL}});
+    return do_all((task){f, dipoles, NUMBER, &f->at, f->count, 0, {f->number, NULL, NULL}});
 }
 
 /* ---- steps ---- */
@@ -147,9 +143,9 @@ static npg_status find_number(field *f, const vectors *dipoles, size_t stride)
 static npg_status advance(field *f)
 {
     double fits = 0, squares = 0;
-    NPG_TRY(find_number(f, &f->step, ASKED));
-    for (size_t i = 0; i * ASKED < f->count; i++) {
-        fits += (double)f->off[i * ASKED] * (double)f->number[i];
+    NPG_TRY(find_number(f, &f->step));
+    for (size_t i = 0; i < f->count; i++) {
+        fits += (double)f->off[i] * (double)f->number[i];
         squares += (double)f->number[i] * (double)f->number[i];
     }
     float by = squares > 0 ? (float)(fits / squares) : 0;
@@ -163,9 +159,9 @@ static npg_status advance(field *f)
 
 static npg_status step_to_half(field *f)
 {
-    NPG_TRY(find_number(f, &f->dipoles, 1));
+    NPG_TRY(find_number(f, &f->dipoles));
     for (size_t i = 0; i < f->count; i++) f->off[i] = 0.5f - f->number[i];
-    NPG_TRY(do_all((task){f, NULL, ADJOINT, &f->at, f->count, 1, 0, f->step}));
+    NPG_TRY(do_all((task){f, NULL, ADJOINT, &f->at, f->count, 0, f->step}));
     return advance(f);
 }
 
@@ -177,7 +173,7 @@ static float length_of(const vectors *v, size_t i)
 /* Each dipole against the gradient, as strong as it is. */
 static npg_status turn(field *f)
 {
-    NPG_TRY(do_all((task){f, NULL, OUTWARD, &f->at, f->count, 1, 0, f->turned}));
+    NPG_TRY(do_all((task){f, NULL, OUTWARD, &f->at, f->count, 0, f->turned}));
     for (size_t i = 0; i < f->count; i++) {
         float length = length_of(&f->turned, i), by = length > 0 ? length_of(&f->dipoles, i) / length : 0;
         f->dipoles.x[i] = by * f->turned.x[i];
@@ -262,7 +258,7 @@ static npg_status read_field(float *normals, field *f, const frame_of *frame, co
     for (size_t first = 0; first < n; first += BATCH) {
         size_t count = n - first < BATCH ? n - first : BATCH;
         split(&places, points + 3 * first, count, frame->middle, frame->unit);
-        NPG_TRY(do_all((task){f, NULL, OUTWARD, &places, count, 1, 0, out}));
+        NPG_TRY(do_all((task){f, NULL, OUTWARD, &places, count, 0, out}));
         join(normals + 3 * first, &out, count);
     }
     return NPG_OK;

@@ -63,7 +63,7 @@ bad_frames() {
 
 @test "far from the origin nothing is taken for one sensor's view, and nothing is trimmed" {
     change bar far '$1 == "v" { for (a = 2; a <= 4; a++) $a = sprintf("%.4f", $a + 1e9) } { print }'
-    run_it 0 far "${small[@]}"
+    run_it 0 far "${small[@]}" --bars residual=1
     grep -q '"unseen": "kept"' far-out/report.json
     [ "$(tail -n 1 far.log | cut -d , -f 1)" = "12 of 12 frames good" ]
 }

@@ -192,6 +192,10 @@ END
     begin_run stopped
     rm stopped/frames.partial.jsonl stopped/reference.ply
     begin_view stopped
+    until [ -e stopped/view.html ]; do
+        kill -0 $view_pid
+        sleep 0.1
+    done
     [ "$(facts_of stopped/view.html)" = "0 True" ]
     pkill -P $run_pid || true
     kill $run_pid || true
