@@ -7,12 +7,12 @@
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 
-#define SPACING_NEIGHBOUR 8
+#define SPACING_NEIGHBOUR 8     /* how far that one is says how dense a cloud is */
 #define SPACING_ASKED     20000 /* points at most that are asked for their neighbours */
-#define NEAR              8
-#define WIDE              24
-#define ASKED_MAX         4000
-#define FLAT_LEAST        0.1 /* of the points, that are not of thin parts */
+#define NEAR              8     /* neighbours that a plane goes through: noise ... */
+#define WIDE              24    /* ... and noise with curvature */
+#define ASKED_MAX         4000  /* points at most that are asked for their noise */
+#define FLAT_LEAST        0.1   /* of the points, that are not of thin parts */
 
 /* Of the distances to k neighbours each the farthest; and of these the median.  Overwrites the list. */
 static float median_farthest(float *dist_sq, size_t count, size_t k)

@@ -19,7 +19,7 @@
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
 
-/* By trial (tests/bed/decisions.md, "Normals"); widths in the cloud's spacing, or its noise. */
+/* By trial (tests/bed/decisions.md, "Normals from nothing"); widths in the cloud's spacing, or its noise. */
 #define CORE_MAX    8000 /* points that are dipoles: each step takes all their pairs */
 #define STEPS       16
 #define WIDTH_FIRST 1.2
