@@ -126,9 +126,10 @@ for _ in range(900):
     moved far 1000000 -2000000 500000
     "$NEUPIG" run near -o near-out --export obj --keyframe 0 --frames 0:1 "${small[@]}"
     "$NEUPIG" run far -o far-out --export obj --keyframe 0 --frames 0:1 "${small[@]}"
-    # the body is 2 wide; in floats alone it would be made of steps of 0.06 and 0.12
+    # the body is 2 wide; in floats alone it would be made of steps of 0.06 and 0.12. Its points lie 0.07 apart and differ
+    # in the last of their digits, so the surfaces through them differ by up to a fifth of that, never by such a step.
     echo "$(box near-out/meshes/frame_0000.obj 0 0 0) $(box far-out/meshes/frame_0000.obj 1000000 -2000000 500000)" |
-        awk '{ print; for (i = 1; i <= 6; i++) if (($i - $(i + 6)) ^ 2 > 0.01 ^ 2) exit 1 }'
+        awk '{ print; for (i = 1; i <= 6; i++) if (($i - $(i + 6)) ^ 2 > 0.03 ^ 2) exit 1 }'
     [ "$(grep -c '"good":true' far-out/frames.jsonl)" -eq 1 ]
     # the file itself has the digits: neighbours are millimetres apart, not the 6 cm that float would leave
     awk '$1 == "v" { print $2 }' far-out/meshes/frame_0000.obj | sort -u | wc -l >distinct
