@@ -38,6 +38,7 @@ static const char *const gone[][2] = { /* "VERB NAME": of that verb alone */
     {"follow-idle",    "--follow-end SECONDS"},
     {"format",         "--export obj"},
     {"rig",            "the rig is the input: neupig run rig.json"},
+    {"sensor-tolerance", "rig_json.py --tolerance SECONDS, which matches images with times"},
     {"optimization",   "tools/method_json.py makes a method of a configuration of the published code"},
     {"grid",           "tools/method_json.py makes a method of a configuration of the published code"},
     {"mlp",            "tools/method_json.py makes a method of a configuration of the published code"},

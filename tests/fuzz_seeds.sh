@@ -4,7 +4,7 @@
 #   tests/fuzz_seeds.sh DIR
 set -euo pipefail
 folder=$1
-for name in ply obj xyz npy pcd config store rig trajectory image; do mkdir -p "$folder/$name"; done
+for name in ply obj xyz npy pcd config store rig sensors image; do mkdir -p "$folder/$name"; done
 cd "$folder"
 
 xyz='property float x\nproperty float y\nproperty float z\n'
@@ -65,12 +65,10 @@ printf '{"captures": [{"input": "/in/a", "name": "..", "text": "x"}, {"input": "
 camera='"camera": {"width": 4, "height": 3, "fx": 5, "fy": 5, "cx": 1.5, "cy": 1, "distortion": [0.1, 0, 0, 0]}'
 pose='"pose": [1,0,0,5, 0,1,0,6, 0,0,1,7, 0,0,0,1]'
 printf '{"neupig_rig": 1, "axes": "opengl", "sensors": [{"name": "a", "depth": "d_%%04d.png", "mask": "m_####.jpg", %s, %s}]}' "$camera" "$pose" >rig/numbered
-printf '{"neupig_rig": 1, "tolerance": 0.1, "sensors": [{"depth": "depth.txt", "poses": "a.log", %s, "near": 1}]}' "$camera" >rig/timed
+printf '{"neupig_rig": 1, "sensors": [{"depth": [null, null], "poses": [], %s, "near": 1}]}' "$camera" >rig/listed
 printf '{"neupig_rig": 1, "sensors": [{"depth": "d_%%d.png", %s, "colour": "c", "colour_camera": {"from_depth": []}}]}' "$camera" >rig/colour
-printf '\0%s' $'0 0 1\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n' >trajectory/log
-printf '\1# images\n1.5 depth/1.png\n2e0 depth/2.png\n' >trajectory/list
-printf '\3# x y z\n1 2 3\n 4 5e0 6\n' >trajectory/sensors
-printf '\3%s' $'1 1 2 3\n1 4 5 6\n0 7 8 9\n' >trajectory/numbered
+printf '# x y z\n1 2 3\n 4 5e0 6\n' >sensors/places
+printf '1 1 2 3\n1 4 5 6\n0 7 8 9\n' >sensors/numbered
 image() { # FILE KIND BASE64...: kind 0 depth, 1 mask, 2 colour; 24 x 24 pixels
     local file=$1 kind=$2
     shift 2

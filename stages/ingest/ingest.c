@@ -46,8 +46,6 @@ static const npg_option ingest_options[] = {
         "Whether depth 0 and what a mask hides say that nothing of the body is there. removed: they do; "
         "unknown: they say nothing; auto: they do where there is a mask, or most pixels of an image have no "
         "depth"),
-    NPG_KEY(REAL,         "sensor-tolerance", AT(rig.tolerance_s), "0.02",        0,    3600,    "SECONDS",
-        "Images of a rig with time stamps belong together when they are no further apart"),
     NPG_ROW_FLAG(         "align-sensors",    AT(align_sensors),   "no",
         "Correct the poses of a rig's sensors that are off. By what they see together with the others in "
         "these frames; one correction for each sensor, the same in all frames. What the surfaces do not "
@@ -119,9 +117,6 @@ static void report_rig(npg_worker *worker, npg_rig *rig)
     if (gaps)
         npg_worker_warn(worker, false, -1, "%zu of %zu images of the rig's sensors are missing", gaps,
                         rig->frame_count * rig->sensor_count);
-    if (rig->left_out)
-        npg_worker_warn(worker, false, -1, "%zu depth images have no pose within %g s and are left out",
-                        rig->left_out, rig->settings.tolerance_s);
 }
 
 static void report_sensor(npg_worker *worker, const npg_rig *rig, const npg_rig_view *view, size_t i)

@@ -97,7 +97,6 @@ typedef struct npg_rig_settings {
     int64_t margin;       /* pixels beside such a step and beside missing depth that are dropped      */
                           /* unless they continue the surface; 0: none                                */
     double near_m, far_m; /* depths that are used, in the rig's unit; far 0: no limit                */
-    double tolerance_s;   /* images of different sensors belong together within this                  */
     bool confine;         /* refuse what the rig names outside its folder                             */
 } npg_rig_settings;
 
@@ -107,8 +106,7 @@ extern const npg_rig_settings npg_rig_usual;
 /* Images of one sensor at one time. */
 typedef struct npg_rig_shot {
     char *depth, *colour, *mask; /* paths; colour and mask may be NULL        */
-    int64_t number;              /* of the frame, where images are numbered   */
-    double time_s;               /* where they are timed                      */
+    int64_t number;              /* of the frame                              */
     bool has_pose;
     double pose[12]; /* sensor to world, where the sensor moves */
 } npg_rig_shot;
@@ -135,13 +133,11 @@ typedef struct npg_rig {
     char *path, *folder; /* as given; the folder that its names start from  */
     char *unit;          /* of lengths, as rig.json names it; NULL: "m"     */
     npg_rig_settings settings;
-    bool is_timed; /* frames are matched by time, else by number */
     npg_rig_sensor *sensors;
     size_t sensor_count, sensor_capacity;
     size_t frame_count;
     int64_t *numbers; /* per frame, growing                      */
     int32_t *shot_of; /* frame_count x sensor_count, -1: a gap   */
-    size_t left_out;  /* images without a pose or without a time */
     /* of those that npg_rig_read() has read: how many have no depth at all, and the first */
     size_t blank_count;
     const char *first_blank;

@@ -16,7 +16,7 @@ enum { WIDE = 40, HIGH = 30 };
 /* The settings without any option. */
 static npg_rig_settings usual_settings(void)
 {
-    return (npg_rig_settings){.step_share = 0.02, .margin = 1, .tolerance_s = 0.02};
+    return (npg_rig_settings){.step_share = 0.02, .margin = 1};
 }
 
 static temp_folder folder;

@@ -40,8 +40,8 @@ static void distortion_is_that_of_opencv(void **state)
 static void poses_are_checked(void **state)
 {
     (void)state;
-    double turned[12], back[12], both[12], q[4] = {0, 0.6, 0, 0.8}, t[3] = {1, 2, 3};
-    assert_int_equal(npg_pose_of_quaternion(turned, q, t, "here"), NPG_OK);
+    double turned[12] = {0.28, 0, 0.96, 1, 0, 1, 0, 2, -0.96, 0, 0.28, 3}, back[12], both[12];
+    assert_int_equal(npg_pose_check(turned, "here"), NPG_OK);
     npg_pose_invert(back, turned);
     npg_pose_combine(both, back, turned);
     for (int i = 0; i < 12; i++) assert_true(fabs(both[i] - (i % 5 == 0)) < 1e-12);
@@ -51,7 +51,6 @@ static void poses_are_checked(void **state)
     assert_non_null(strstr(npg_error_text(), "mirror"));
     assert_int_equal(npg_pose_check(scaled, "here"), NPG_BAD_INPUT);
     assert_non_null(strstr(npg_error_text(), "no rotation"));
-    assert_int_equal(npg_pose_of_quaternion(turned, (const double[4]){0, 0, 0, 2}, t, "here"), NPG_BAD_INPUT);
 }
 
 /* ---- one sensor ---- */
@@ -294,7 +293,9 @@ static void an_image_without_depth_is_counted_and_named(void **state)
 
 /* ---- layouts of others ---- */
 
-static void lists_with_times(void **state)
+#define AT(x, y, z) "[1, 0, 0, " #x ", 0, 1, 0, " #y ", 0, 0, 1, " #z ", 0, 0, 0, 1]"
+
+static void lists_of_images(void **state)
 {
     (void)state;
     npg_frame frame;
@@ -304,24 +305,17 @@ static void lists_with_times(void **state)
     make_folder("tum/depth");
     write_depth("tum/depth/1.png", 0);
     write_colour("tum/depth/c.png");
-    write_text(
-        "tum/rig.json",
-        RIG("{\"depth\": \"depth.txt\", \"colour\": \"rgb.txt\", \"poses\": \"groundtruth.txt\", " CAMERA
-            ", \"depth_scale\": 0.0002}"));
-    write_text("tum/depth.txt", "# depth\n1.000 depth/1.png\n2.000 depth/1.png\n3.5 depth/1.png\n");
-    write_text("tum/rgb.txt", "0.99 depth/c.png\n2.5 depth/c.png\n3.51 depth/c.png\n");
-    write_text("tum/groundtruth.txt", "# t x y z q\n1.005 0 0 0 0 0 0 1\n3.49 1 2 3 0 0 0 1\n");
+    write_text("tum/rig.json", RIG("{\"depth\": [\"depth/1.png\", null, \"depth/1.png\"], " CAMERA
+                                   ", \"colour\": [null, null, \"depth/c.png\"], \"depth_scale\": 0.0002"
+                                   ", \"poses\": [" AT(0, 0, 0) ", " AT(1, 2, 3) "]}"));
     assert_int_equal(npg_rig_open(&rig, in_folder(&folder, "tum"), &usual), NPG_OK);
-    assert_int_equal(rig->frame_count, 2); /* the one at 2.0 has no pose near it */
-    assert_int_equal(rig->left_out, 1);
+    assert_int_equal(rig->frame_count, 2);
+    assert_int_equal(rig->numbers[1], 2);
     npg_rig_close(&rig);
     assert_int_equal(read_rig_frame(&frame, "tum", 1, NULL), NPG_OK);
     assert_non_null(frame.colours);
     assert_true(fabs((double)frame.pos_local[2] - 3.2) < 1e-6); /* 1000 / 5000 + 3 */
     npg_frame_clear(&frame);
-    write_text("tum/groundtruth.txt", "9 0 0 0 0 0 0 1\n");
-    assert_int_equal(read_rig_frame(&frame, "tum", 0, NULL), NPG_BAD_INPUT);
-    assert_non_null(strstr(npg_error_text(), "images out of step"));
 }
 
 static void layouts_without_a_rig_name_the_script(void **state)
@@ -362,11 +356,16 @@ static const struct {
     {RIG("{" CAMERA "}"), "sensors[0].depth: is missing"},
     {RIG("{" DEPTH "}"), "sensors[0].camera: is missing: the intrinsics"},
     {WITH("\"dept\": 1"), "sensors[0].dept: unknown key"},
-    {WITH("\"mask\": 7"), "sensors[0].mask: must be a text"},
+    {WITH("\"mask\": 7"), "sensors[0].mask: must be a pattern"},
     {WITH("\"mask\": \"m.png\""), "sensors[0].mask: must be a pattern"},
     {WITH("\"mask\": \"m_%04d.png\""), "sensors[0].mask"},
     {WITH("\"depth_scale\": 0"), "depth_scale: must be more than 0"},
-    {WITH("\"poses\": \"none.log\""), "none.log"},
+    {WITH("\"poses\": []"), "0 poses, but 1 depth images"},
+    {WITH("\"poses\": [[1]]"), "poses[0]: must be 16 numbers"},
+    {WITH("\"poses\": \"a.log\""), "rig_json.py lists those of a file"},
+    {WITH("\"mask\": [7]"), "sensors[0].mask: must hold the names of images"},
+    {WITH("\"mask\": [\"none.png\"]"), "none.png"},
+    {RIG("{\"depth\": [null], " CAMERA "}"), "there is no depth image"},
     {WITH("\"colour\": \"late_%04d.png\""), "frame 0 has a depth image, but none of these"},
     {WITH_POSE("1, 0, 0"), "pose: must be 16 numbers"},
     {WITH_POSE("1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,1,1"), "its last row must be 0 0 0 1"},
@@ -425,35 +424,6 @@ static void bad_rigs_are_refused(void **state)
     }
 }
 
-static const struct {
-    const char *name, *text, *message;
-} bad_trajectories[] = {
-    {"a.log", "", "no entry"},
-    {"a.log", "0 0 1\n1 0 0 0\n", "ends in the rows of a matrix"},
-    {"a.log", "0 0\n", "line 1: number 3 of 3 is missing"},
-    {"a.log", "0 0 1\n1 0 0 0\n0 1 0 0\n0 0 3 0\n0 0 0 1\n", "line 2: the pose is no rotation"},
-    {"a.log", "0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 2\n", "line 5: the last row"},
-    {"a.txt", "1 0 0 0 0 0 0 1 9\n", "line 1: more than 8 numbers"},
-    {"a.txt", "1 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "line 2: the time 1.000000 does not come after"},
-    {"a.txt", "1 0 0 0 0 0 0 0.5\n", "line 1: the pose is no rotation: its quaternion has length 0.5"},
-    {"a.txt", "1 0 0 nan 0 0 0 1\n", "line 1: number 4 of 8"},
-};
-
-static void bad_trajectories_are_refused(void **state)
-{
-    (void)state;
-    for (size_t i = 0; i < sizeof bad_trajectories / sizeof *bad_trajectories; i++) {
-        npg_stamped_list list;
-        npg_arena arena = {.purpose = NPG_FOR_FILES};
-        const char *path = in_folder(&folder, bad_trajectories[i].name);
-        write_text(bad_trajectories[i].name, bad_trajectories[i].text);
-        assert_int_equal(npg_read_trajectory(&list, &arena, path), NPG_BAD_INPUT);
-        npg_arena_release(&arena);
-        if (!strstr(npg_error_text(), bad_trajectories[i].message) || !strstr(npg_error_text(), path))
-            fail_msg("%s\nbut not: %s", npg_error_text(), bad_trajectories[i].message);
-    }
-}
-
 static void confine_refuses_what_leads_out(void **state)
 {
     (void)state;
@@ -461,13 +431,13 @@ static void confine_refuses_what_leads_out(void **state)
     npg_rig_settings confined = usual_settings();
     confined.confine = true;
     make_folder("in");
-    write_text("outside.log", "0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+    write_colour("outside.png");
     write_depth("in/d_0000.png", 0);
-    write_text("in/rig.json", WITH("\"poses\": \"../outside.log\""));
+    write_text("in/rig.json", WITH("\"mask\": [\"../outside.png\"]"));
     assert_int_equal(read_rig_frame(&frame, "in", 0, NULL), NPG_OK);
     npg_frame_clear(&frame);
     assert_int_equal(read_rig_frame(&frame, "in", 0, &confined), NPG_BAD_INPUT);
-    assert_non_null(strstr(npg_error_text(), "outside.log"));
+    assert_non_null(strstr(npg_error_text(), "outside.png"));
 }
 
 /* ---- images ---- */
@@ -504,10 +474,9 @@ int main(void)
                                        cmocka_unit_test(a_view_says_where_nothing_is),
                                        cmocka_unit_test(a_missing_image_is_a_gap_of_its_sensor),
                                        cmocka_unit_test(an_image_without_depth_is_counted_and_named),
-                                       cmocka_unit_test(lists_with_times),
+                                       cmocka_unit_test(lists_of_images),
                                        cmocka_unit_test(layouts_without_a_rig_name_the_script),
                                        cmocka_unit_test(bad_rigs_are_refused),
-                                       cmocka_unit_test(bad_trajectories_are_refused),
                                        cmocka_unit_test(confine_refuses_what_leads_out),
                                        cmocka_unit_test(images_of_other_kinds)};
     return cmocka_run_group_tests(tests, open_rig_tests, close_rig_tests);

@@ -84,12 +84,13 @@ static void write_rig(const char *rig, int cameras, int off, const double by[6],
     at +=
         sprintf(at, "{\"neupig_rig\": 1, \"depth_scale\": %g, \"unit\": \"%s\", \"sensors\": [", STEP, unit);
     for (int c = 0; c < cameras; c++) {
-        double pose[12], turn[12], moved[12];
+        double pose[12], moved[12];
+        double turn[12] = {1,      -by[2], by[1],  0,     by[2], 1,
+                           -by[0], 0,      -by[1], by[0], 1,     0}; /* by's first order */
         ring(pose, c, cameras);
         memcpy(moved, pose, sizeof moved);
         if (c == off) {
-            const double q[4] = {by[0] / 2, by[1] / 2, by[2] / 2, 1}, none[3] = {0};
-            assert_int_equal(npg_pose_of_quaternion(turn, q, none, "here"), NPG_OK);
+            assert_int_equal(npg_pose_check(turn, "here"), NPG_OK);
             npg_pose_combine(moved, turn, pose);
             for (int r = 0; r < 3; r++) moved[4 * r + 3] = pose[4 * r + 3] + by[3 + r];
         }

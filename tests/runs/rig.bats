@@ -272,6 +272,43 @@ END
     [[ "$output" == *"no layout that is known"* ]]
 }
 
+@test "lists with times and files of poses are written into a rig.json" {
+    mkdir lists
+    cp -r capture/rig/camera* lists/
+    python3 - <<'END'
+import json
+root = json.load(open("capture/rig/rig.json"))
+a, b, c = root["sensors"][:3]
+# b came 5 ms later and has no second image; c is numbered and moves
+for sensor, late, left_out in (a, 0, None), (b, 0.005, 1):
+    folder = sensor["depth"].split("/")[0]
+    names = [sensor["depth"] % at for at in range(4)]
+    lines = [f"{at / 30 + late} {name.split('/')[1]}\n" for at, name in enumerate(names) if at != left_out]
+    open(f"lists/{folder}/depth.txt", "w").write("# time path\n" + "".join(lines))
+    sensor["depth"] = f"{folder}/depth.txt"
+    del sensor["colour"]
+c.pop("pose")
+open("lists/c.txt", "w").write("".join(f"{at} 0 0 {at} 0 0.6 0 0.8\n" for at in range(4)))
+c["poses"] = "c.txt"
+root["sensors"] = [a, b]
+json.dump(root, open("lists/rig.json", "w"))
+root["sensors"] = [c]
+json.dump(root, open("lists/moving.json", "w"))
+END
+    run "$NEUPIG" probe lists/rig.json
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"sensors[0].depth: must be a pattern"*"rig_json.py"* ]]
+    "$BATS_TEST_DIRNAME/../../tools/rig_json.py" lists/rig.json
+    "$NEUPIG" probe lists/rig.json --json >lists.json
+    "$BATS_TEST_DIRNAME/../../tools/rig_json.py" lists/moving.json
+    python3 - <<'END'
+import json
+assert [sensor["images"] for sensor in json.load(open("lists.json"))["sensors"]] == [4, 3]
+pose = json.load(open("lists/moving.json"))["sensors"][0]["poses"][3]
+assert max(abs(a - b) for a, b in zip(pose, [.28, 0, .96, 0, 0, 1, 0, 0, -.96, 0, .28, 3, 0, 0, 0, 1])) < 1e-9
+END
+}
+
 @test "a real recording: OpenCV files per frame" {
     data=${NEUPIG_TEST_DATA:-}/kinect-rig
     [ -d "$data" ] || skip "NEUPIG_TEST_DATA names no folder with kinect-rig"

@@ -130,17 +130,3 @@ npg_status npg_pose_check(double pose[12], const char *where)
     make_exact(pose);
     return NPG_OK;
 }
-
-npg_status npg_pose_of_quaternion(double pose[12], const double q[4], const double t[3], const char *where)
-{
-    double x = q[0], y = q[1], z = q[2], w = q[3], n = x * x + y * y + z * z + w * w;
-    if (!(fabs(n - 1) < 0.02)) /* |q| within 1 %: files round it; others mean something else */
-        return npg_error(NPG_BAD_INPUT, "%s: the pose is no rotation: its quaternion has length %g", where,
-                         sqrt(n));
-    const double s = 2 / n,
-                 rows[12] = {1 - s * (y * y + z * z), s * (x * y - z * w),     s * (x * z + y * w),     t[0],
-                             s * (x * y + z * w),     1 - s * (x * x + z * z), s * (y * z - x * w),     t[1],
-                             s * (x * z - y * w),     s * (y * z + x * w),     1 - s * (x * x + y * y), t[2]};
-    memcpy(pose, rows, sizeof rows);
-    return npg_pose_check(pose, where);
-}

@@ -57,7 +57,7 @@ bool npg_rig_is(const char *path)
     return npg_is_in_folder(path, "rig.json") || foreign_layout(path);
 }
 
-const npg_rig_settings npg_rig_usual = {.step_share = 0.02, .margin = 1, .tolerance_s = 0.02};
+const npg_rig_settings npg_rig_usual = {.step_share = 0.02, .margin = 1};
 
 /* ---- open and close ---- */
 
@@ -116,18 +116,18 @@ npg_status npg_rig_path(npg_rig *rig, char **path, const char *name, bool must_b
 
 /* ---- sensors and shots ---- */
 
-npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **out, const char *name)
+npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **out)
 {
     if (rig->sensor_count >= NPG_RIG_SENSORS_MAX)
         return npg_error(NPG_BAD_INPUT, "%s: more than %d sensors", rig->path, NPG_RIG_SENSORS_MAX);
     NPG_TRY(npg_arena_grow(&rig->arena, &rig->sensors, &rig->sensor_capacity, rig->sensor_count + 1,
                            sizeof *rig->sensors));
     npg_rig_sensor *sensor = &rig->sensors[rig->sensor_count++];
-    *sensor = (npg_rig_sensor){.scale = 0.001, .name = npg_arena_text(&rig->arena, name)};
+    *sensor = (npg_rig_sensor){0};
     npg_pose_identity(sensor->pose);
     npg_pose_identity(sensor->depth_to_colour);
     *out = sensor;
-    return npg_arena_status(&rig->arena);
+    return NPG_OK;
 }
 
 npg_status npg_rig_add_shot(npg_rig *rig, npg_rig_sensor *sensor, const npg_rig_shot *shot)
@@ -158,80 +158,30 @@ static npg_status list_numbers(npg_rig *rig)
     return NPG_OK;
 }
 
-/* The times of the first sensor are those of the frames, numbered from 0. */
-static npg_status list_times(npg_rig *rig)
-{
-    rig->frame_count = rig->sensors[0].shot_count;
-    rig->numbers = npg_arena_take(&rig->arena, rig->frame_count + 1, sizeof *rig->numbers);
-    NPG_TRY(npg_arena_status(&rig->arena));
-    for (size_t f = 0; f < rig->frame_count; f++) {
-        rig->numbers[f] = (int64_t)f;
-        rig->sensors[0].shots[f].number = (int64_t)f;
-    }
-    return NPG_OK;
-}
-
-/* The first shot that is not before a time, or with is_timed false a number; shots are in that order. */
-static size_t first_from(const npg_rig_sensor *sensor, bool is_timed, double time_s, int64_t number)
+/* Shots are in order of their numbers. */
+static int32_t numbered_shot(const npg_rig_sensor *sensor, int64_t number)
 {
     size_t lo = 0, hi = sensor->shot_count;
     while (lo < hi) {
         size_t middle = (lo + hi) / 2;
-        const npg_rig_shot *shot = &sensor->shots[middle];
-        if (is_timed ? shot->time_s < time_s : shot->number < number)
+        if (sensor->shots[middle].number < number)
             lo = middle + 1;
         else
             hi = middle;
     }
-    return lo;
-}
-
-static int32_t nearest_shot(const npg_rig_sensor *sensor, double time_s, double tolerance_s)
-{
-    size_t lo = first_from(sensor, true, time_s, 0);
-    int32_t best = -1;
-    double least = tolerance_s;
-    for (size_t i = lo ? lo - 1 : 0; i < sensor->shot_count && i <= lo; i++) {
-        double off = fabs(sensor->shots[i].time_s - time_s);
-        if (off > least) continue;
-        least = off;
-        best = (int32_t)i;
-    }
-    return best;
-}
-
-static int32_t numbered_shot(const npg_rig_sensor *sensor, int64_t number)
-{
-    size_t lo = first_from(sensor, false, 0, number);
     return lo < sensor->shot_count && sensor->shots[lo].number == number ? (int32_t)lo : -1;
-}
-
-static npg_status check_order(const npg_rig *rig)
-{
-    for (size_t s = 0; s < rig->sensor_count; s++)
-        for (size_t i = 1; i < rig->sensors[s].shot_count; i++) {
-            const npg_rig_shot *a = &rig->sensors[s].shots[i - 1], *b = a + 1;
-            if (rig->is_timed ? b->time_s > a->time_s : b->number > a->number) continue;
-            return npg_error(NPG_BAD_INPUT, "%s: sensor %s: %s does not come after %s", rig->path,
-                             rig->sensors[s].name, b->depth, a->depth);
-        }
-    return NPG_OK;
 }
 
 npg_status npg_rig_join(npg_rig *rig)
 {
     if (!rig->sensor_count) return npg_error(NPG_BAD_INPUT, "%s: there is no sensor", rig->path);
-    NPG_TRY(check_order(rig));
-    NPG_TRY(rig->is_timed ? list_times(rig) : list_numbers(rig));
+    NPG_TRY(list_numbers(rig));
     if (!rig->frame_count) return npg_error(NPG_BAD_INPUT, "%s: there is no depth image", rig->path);
     rig->shot_of = npg_arena_take(&rig->arena, rig->frame_count * rig->sensor_count, sizeof *rig->shot_of);
     NPG_TRY(npg_arena_status(&rig->arena));
     for (size_t f = 0; f < rig->frame_count; f++)
         for (size_t s = 0; s < rig->sensor_count; s++)
-            rig->shot_of[f * rig->sensor_count + s] =
-                rig->is_timed ? nearest_shot(&rig->sensors[s], rig->sensors[0].shots[f].time_s,
-                                             s ? rig->settings.tolerance_s : 0)
-                              : numbered_shot(&rig->sensors[s], rig->numbers[f]);
+            rig->shot_of[f * rig->sensor_count + s] = numbered_shot(&rig->sensors[s], rig->numbers[f]);
     return NPG_OK;
 }
 

@@ -188,13 +188,17 @@ static void add_prior(solving *s)
     }
 }
 
-/* pose = (turn about the centre, then shift) after pose. */
+/* pose = (turn about the centre, then shift) after pose.  The turn is Rodrigues' formula. */
 static void move(double pose[12], const double step[6], const double centre[3])
 {
-    double angle = npg_vec3_length(step), by[12], to[3], before[12];
-    const double half = 0.5 * angle, share = angle > 0 ? sin(half) / angle : 0.5;
-    const double q[4] = {share * step[0], share * step[1], share * step[2], cos(half)}, none[3] = {0};
-    if (npg_pose_of_quaternion(by, q, none, "")) return; /* a unit quaternion always is one */
+    double angle = npg_vec3_length(step), by[12] = {0}, to[3], before[12], axis[3] = {0};
+    for (size_t a = 0; a < 3 && angle > 0; a++) axis[a] = step[a] / angle;
+    for (size_t r = 0; r < 3; r++) {
+        for (size_t c = 0; c < 3; c++)
+            by[4 * r + c] = (1 - cos(angle)) * axis[r] * axis[c] + (r == c ? cos(angle) : 0);
+        by[4 * r + (r + 1) % 3] -= sin(angle) * axis[(r + 2) % 3];
+        by[4 * r + (r + 2) % 3] += sin(angle) * axis[(r + 1) % 3];
+    }
     npg_pose_apply(to, by, centre);
     for (size_t a = 0; a < 3; a++) by[4 * a + 3] = centre[a] - to[a] + step[3 + a];
     memcpy(before, pose, sizeof before);

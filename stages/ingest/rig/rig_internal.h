@@ -27,57 +27,26 @@ void npg_pose_invert(double out[12], const double pose[12]); /* of a rotation; o
  * what is off by rounding in a file is made exact. */
 npg_status npg_pose_check(double pose[12], const char *where);
 
-/* [R | t] from a quaternion (any length but 0) and a translation. */
-npg_status npg_pose_of_quaternion(double pose[12], const double xyzw[4], const double t[3],
-                                  const char *where);
-
 #define NPG_RIG_SHOTS_MAX 4000000            /* images of one sensor: 18 hours at 60 a second           */
-#define NPG_RIG_TEXT_MAX  ((size_t)64 << 20) /* bytes of a calibration or trajectory file    */
+#define NPG_RIG_TEXT_MAX  ((size_t)64 << 20) /* bytes of a calibration                       */
 
 /* ---- between the files of a rig ---- */
 
-npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **sensor, const char *name);
+npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **sensor);
 
 /* Add an image, whose paths are the rig's. */
 npg_status npg_rig_add_shot(npg_rig *rig, npg_rig_sensor *sensor, const npg_rig_shot *shot);
 
-/* Once all shots are there: frames by number or time.  NPG_BAD_INPUT when no image is left, or numbers or
- * times do not grow. */
+/* Once all shots are there, each sensor's in order of their numbers.  NPG_BAD_INPUT where there is none. */
 npg_status npg_rig_join(npg_rig *rig);
 
 npg_status npg_rig_load_json(npg_rig *rig);
-
-/* Images by lists of "time path" lines (paths from the list's folder), poses by a trajectory with times, or
- * none (NULL); colours are those nearest in time.  Images without a pose are left out and counted. */
-npg_status npg_rig_load_timed(npg_rig *rig, npg_rig_sensor *sensor, const char *depth, const char *colour,
-                              const char *poses);
 
 bool npg_rig_ends_with(const char *name, const char *ending);
 
 /* "<rig's folder>/<name>", a text of the rig's, refused under confine where it leads out; NPG_BAD_INPUT where it is
  * not there and must be. */
 npg_status npg_rig_path(npg_rig *rig, char **path, const char *name, bool must_be);
-
-/* Where images are timed, or trajectories come in order: files of "time path" lines and of poses. */
-typedef struct npg_stamped {
-    double time_s;
-    char *path;      /* of lists        */
-    double pose[12]; /* of trajectories */
-} npg_stamped;
-
-typedef struct npg_stamped_list {
-    npg_arena *arena; /* a loan: what the items and their paths are of */
-    npg_stamped *items;
-    size_t count, capacity;
-} npg_stamped_list;
-
-/* "time path" lines as TUM RGB-D has them; # begins a comment; times must grow. */
-npg_status npg_read_image_list(npg_stamped_list *list, npg_arena *arena, const char *path);
-/* "time tx ty tz qx qy qz qw" lines (TUM), or blocks of three integers and a 4 x 4 matrix (Redwood; time_s is
- * then the place in the file).  The ending .log says Redwood. */
-npg_status npg_read_trajectory(npg_stamped_list *list, npg_arena *arena, const char *path);
-/* The nearest in time within the tolerance, NULL without one. */
-const npg_stamped *npg_stamped_near(const npg_stamped_list *list, double time_s, double tolerance_s);
 
 /* What one depth image gave, in the sensor's own axes. */
 typedef struct npg_depth_points {
