@@ -4,19 +4,11 @@
 #include <locale.h>
 #include <math.h>
 #include <pthread.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <strings.h>
 
-#define DIGITS_MAX 19  /* what fits an uint64_t                            */
-#define POWER_MAX  27  /* 10^27 is exact in a 64-bit mantissa: 5^27 < 2^63 */
-#define TOKEN_MAX  800 /* longer than any double needs: 767 digits         */
-
-static const long double power_of_ten[POWER_MAX + 1] = {
-    1e0L,  1e1L,  1e2L,  1e3L,  1e4L,  1e5L,  1e6L,  1e7L,  1e8L,  1e9L,  1e10L, 1e11L, 1e12L, 1e13L,
-    1e14L, 1e15L, 1e16L, 1e17L, 1e18L, 1e19L, 1e20L, 1e21L, 1e22L, 1e23L, 1e24L, 1e25L, 1e26L, 1e27L};
+#define TOKEN_MAX 800 /* longer than any double needs: 767 digits */
 
 static locale_t c_locale;
 static pthread_once_t c_locale_once = PTHREAD_ONCE_INIT;
@@ -32,98 +24,49 @@ static bool ends(const char *text, const char *end)
            *text == '\v' || *text == '\f';
 }
 
-static double by_library(const char *text)
+/* Up to 15 digits with a point, as most numbers are: both factors are exact, so the one rounding is right (Clinger
+ * 1990). */
+static const char *parse_short(const char *text, const char *end, double *value)
 {
-    pthread_once(&c_locale_once, open_c_locale);
-    return c_locale ? strtod_l(text, NULL, c_locale) : strtod(text, NULL);
-}
-
-/* Words for numbers that are not finite. */
-static const char *parse_word(const char *text, const char *end, bool negative, double *value)
-{
-    /* clang-format off */
-    static const struct {
-        const char *word;
-        double value;
-    } words[] = {
-        {"nan",       (double)NAN},
-        {"inf",       (double)INFINITY},
-        {"infinity",  (double)INFINITY},
-        {"nan(ind)",  (double)NAN}, /* Windows libraries of today */
-        {"nan(snan)", (double)NAN},
-        {"1.#qnan",   (double)NAN}, /* older ones, padded to the digits asked for */
-        {"1.#qnan0",  (double)NAN},
-        {"1.#ind",    (double)NAN},
-        {"1.#ind00",  (double)NAN},
-        {"1.#inf",    (double)INFINITY},
-        {"1.#inf00",  (double)INFINITY}};
-    /* clang-format on */
-    size_t length = 0;
-    while (!ends(text + length, end)) length++;
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
-        if (strlen(words[i].word) != length || strncasecmp(words[i].word, text, length) != 0) continue;
-        *value = negative ? -words[i].value : words[i].value;
-        return text + length;
-    }
-    return NULL;
-}
-
-/* What the quick way can't do exactly goes to the C library, as a copy because the text has no end mark. */
-static const char *parse_long(const char *token, const char *after, double *value)
-{
-    char copy[TOKEN_MAX + 1];
-    size_t length = (size_t)(after - token);
-    if (length > TOKEN_MAX) return NULL;
-    memcpy(copy, token, length);
-    copy[length] = 0;
-    *value = by_library(copy);
-    return after;
-}
-
-static const char *parse_exponent(const char *text, const char *end, int *exponent)
-{
-    bool negative = false, any = false;
-    int value = 0;
-    if (text < end && (*text == '+' || *text == '-')) negative = *text++ == '-';
-    for (; text < end && *text >= '0' && *text <= '9'; text++, any = true)
-        if (value < 100000) value = value * 10 + (*text - '0'); /* beyond that it is 0 or infinity anyway */
-    *exponent = negative ? -value : value;
-    return any ? text : NULL;
-}
-
-const char *npg_number_parse(const char *token, const char *end, double *value)
-{
-    const char *text = token;
-    bool negative = false;
-    if (text < end && (*text == '+' || *text == '-')) negative = *text++ == '-';
-    uint64_t mantissa = 0;
-    int digits = 0, significant = 0, scale = 0, exponent = 0;
-    for (bool after_point = false; text < end; text++) {
+    static const double power_of_ten[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                          1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+    bool is_negative = text < end && *text == '-', has_point = false;
+    uint64_t digits = 0;
+    int count = 0, behind = 0;
+    for (text += is_negative; text < end; text++) {
         unsigned digit = (unsigned)*text - '0';
-        if (digit <= 9) {
-            digits++;
-            significant += significant > 0 || digit > 0; /* leading zeros are not */
-            if (significant <= DIGITS_MAX) mantissa = mantissa * 10 + digit;
-            scale -= after_point;
-        } else if (*text == '.' && !after_point) {
-            after_point = true;
+        if (digit <= 9 && count++ < 15) {
+            digits = 10 * digits + digit;
+            behind += has_point;
+        } else if (*text == '.' && !has_point) {
+            has_point = true;
         } else {
             break;
         }
     }
-    if (token == end) return NULL;
-    if (!digits || (text < end && *text == '#'))
-        return parse_word(token + (*token == '+' || *token == '-'), end, negative, value);
-    if (text < end && (*text == 'e' || *text == 'E')) text = parse_exponent(text + 1, end, &exponent);
-    if (!text || !ends(text, end)) return NULL;
-    scale += exponent;
-    if (significant > DIGITS_MAX || scale > POWER_MAX || scale < -POWER_MAX)
-        return parse_long(token, text, value);
-    /* Both factors are exact in the 64-bit mantissa of x86: one rounding here, one to double. */
-    long double result = (long double)mantissa;
-    result = scale < 0 ? result / power_of_ten[-scale] : result * power_of_ten[scale];
-    *value = negative ? -(double)result : (double)result;
-    return text;
+    *value = (is_negative ? -(double)digits : (double)digits) / power_of_ten[behind];
+    return count && ends(text, end) ? text : NULL;
+}
+
+const char *npg_number_parse(const char *text, const char *end, double *value)
+{
+    static const char *const of_windows[] = {"#inf", "#ind", "#qnan"}; /* behind "1." */
+    char copy[TOKEN_MAX + 1], *after;                                  /* the text has no end mark */
+    const char *short_end = parse_short(text, end, value);
+    size_t length = 0;
+    if (short_end) return short_end;
+    for (; length < TOKEN_MAX && !ends(text + length, end); length++) copy[length] = text[length];
+    copy[length] = 0;
+    if (!ends(text + length, end) || strpbrk(copy, "xX\n")) return NULL;
+    pthread_once(&c_locale_once, open_c_locale);
+    *value = c_locale ? strtod_l(copy, &after, c_locale) : strtod(copy, &after);
+    for (size_t i = 0; i < 3 && after > copy; i++) {
+        if (strncasecmp(after, of_windows[i], strlen(of_windows[i])) != 0) continue;
+        *value = i ? (double)NAN : copysign((double)INFINITY, *value);
+        after += strlen(of_windows[i]);
+        after += strspn(after, "0"); /* padded to the digits asked for */
+    }
+    return length && after == copy + length ? text + length : NULL;
 }
 
 /* The formats come from this library's own writers. */

@@ -1,17 +1,14 @@
 /* Options: tables, one per stage; parser, help, methods and manual all come from them. */
 #include "pipeline/options.h"
 
-#include <ctype.h>
-#include <errno.h>
 #include <jansson.h>
-#include <locale.h>
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "pipeline/memory.h"
+#include "pipeline/source.h"
 #include "pipeline/stage.h"
 #include "pipeline/struct_size.h"
 
@@ -94,28 +91,12 @@ static int which_flag(const char *text)
     return which_choice("no|false|off|0", text) >= 0 ? 0 : which_choice("yes|true|on|1", text) >= 0 ? 1 : -1;
 }
 
-/* Numbers are written with a point whatever the program's locale says. */
-static locale_t plain_locale;
-
-static void make_plain_locale(void)
-{
-    plain_locale = newlocale(LC_ALL_MASK, "C", NULL);
-}
-
-static double read_number(const char *text, char **end)
-{
-    static pthread_once_t once = PTHREAD_ONCE_INIT;
-    pthread_once(&once, make_plain_locale);
-    return plain_locale ? strtod_l(text, end, plain_locale) : strtod(text, end);
-}
-
 static npg_status check_number(const npg_option *option, const char *text)
 {
-    char *end;
-    errno = 0;
-    double value = read_number(text, &end);
-    bool whole = option->type != NPG_OPTION_INT || (value == floor(value) && !strpbrk(text, ".xXeEnN"));
-    if (end == text || *end || errno || !isfinite(value) || !whole || isspace((unsigned char)*text))
+    double value = NAN;
+    const char *end = npg_number_parse(text, text + strlen(text), &value);
+    bool whole = option->type != NPG_OPTION_INT || (value == floor(value) && !strpbrk(text, ".eE"));
+    if (!end || *end || !isfinite(value) || !whole)
         return npg_error(NPG_USAGE, "option %s: \"%s\" is not %s", option->name, text,
                          option->type == NPG_OPTION_INT ? "a whole number" : "a number");
     if (value < option->min || value > option->max)
@@ -385,7 +366,7 @@ void npg_option_store(const npg_option *option, const char *text, void *state)
     switch (option->type) {
     case NPG_OPTION_FLAG: *(bool *)slot = which_flag(text) == 1; break;
     case NPG_OPTION_INT: *(int64_t *)slot = strtoll(text, NULL, 10); break;
-    case NPG_OPTION_REAL: *(double *)slot = read_number(text, NULL); break;
+    case NPG_OPTION_REAL: npg_number_parse(text, text + strlen(text), slot); break;
     case NPG_OPTION_CHOICE: *(int *)slot = which_choice(option->choices, text); break;
     case NPG_OPTION_TEXT: *(const char **)slot = text; break;
     }

@@ -12,9 +12,7 @@
 
 /* The number that begins at text (no leading space): [+-]digits[.digits][e[+-]digits], nan, inf, infinity and
  * what older Windows libraries print for them (1.#IND, 1.#INF).  Returns the first byte after it, NULL when
- * there is none or it does not end before a space, a separator (',', ';') or the end.
- * Correctly rounded up to 19 digits and moderate exponents, save for halfway cases that extended precision
- * can't tell apart (off by at most one last place); beyond that the C library decides. */
+ * there is none or it does not end before a space, a separator (',', ';') or the end. */
 const char *npg_number_parse(const char *text, const char *end, double *value);
 
 /* A number as printf writes it with this format (one double), with a decimal point in every locale;

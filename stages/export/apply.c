@@ -1,6 +1,5 @@
 /* Apply: another mesh, or points, carried through all frames of a finished run. */
 #include <jansson.h>
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -31,7 +30,7 @@ typedef struct applying {
     bool turns_normals; /* they are the file's own                                                */
     bool is_like;       /* OBJ from OBJ: the file's lines are kept                                */
     npg_mesh_names names;
-    npg_done done; /* OUT/done.json; appears last */
+    json_t *files; /* of OUT/done.json, which appears last; owned */
     npg_applied *applied;
     size_t frame_count;
     int64_t number_max;
@@ -205,9 +204,7 @@ static npg_status open_output(applying *a)
         return npg_error(NPG_USAGE, "%s holds a run; choose another output folder", output);
     if (!a->s->overwrite) NPG_TRY(npg_folder_each(output, NPG_DISK, clear_file, a));
     NPG_TRY(npg_file_remove(output, "done.json")); /* first: what is left can't pass for whole */
-    if (a->s->overwrite) NPG_TRY(npg_folder_each(output, NPG_DISK, clear_file, a));
-    NPG_TRY(npg_export_open(&a->done.file, output, "done.json"));
-    return npg_file_print(a->done.file, "{\n  \"files\": [");
+    return a->s->overwrite ? npg_folder_each(output, NPG_DISK, clear_file, a) : NPG_OK;
 }
 
 /* ---- writing ---- */
@@ -233,7 +230,7 @@ static npg_status write_pose(applying *a, const float *vert_pos, int64_t number)
     npg_mesh_name(name, &a->names, number);
     NPG_TRY(npg_path_of(path, a->s->output, name));
     NPG_TRY(a->is_like ? npg_write_obj_like(path, a->s->mesh, &view) : npg_write_mesh(path, &view));
-    NPG_TRY(npg_done_add_file(&a->done, a->s->output, name));
+    NPG_TRY(npg_done_add(a->files, a->s->output, name));
     a->applied->frames++;
     return NPG_OK;
 }
@@ -307,19 +304,14 @@ static npg_status write_done(applying *a)
         NPG_TRY(write_step(a));
     }
     json_t *facts =
-        json_pack("{ss sI sI sI sf si}", "neupig", npg_version(), "frames", (json_int_t)a->frame_count,
+        json_pack("{ss sI sI sI sf si so so}", "neupig", npg_version(), "frames", (json_int_t)a->frame_count,
                   "fps_scale", (json_int_t)a->s->fps_scale, "points_far", (json_int_t)a->applied->far_count,
                   "fps", a->fps * (double)a->s->fps_scale, "exit_code",
-                  npg_status_exit_code(a->applied->far_count ? NPG_PARTIAL : NPG_OK));
-    json_object_set_new(facts, "job", npg_json_text(a->s->job));
-    json_object_set_new(facts, "mesh", npg_json_text(a->s->mesh));
-    char *text = json_dumps(facts, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+                  npg_status_exit_code(a->applied->far_count ? NPG_PARTIAL : NPG_OK), "job",
+                  npg_json_text(a->s->job), "mesh", npg_json_text(a->s->mesh));
+    npg_status status = npg_done_write(a->s->output, facts, a->files);
     json_decref(facts);
-    if (!text) return npg_error(NPG_MEMORY, "no memory for done.json");
-    npg_status status =
-        npg_file_print(a->done.file, "\n  ],%s\n", text + 1); /* the rest of the same object */
-    free(text);
-    return npg_done_end(&a->done, a->s->output, status);
+    return status;
 }
 
 static npg_status apply(applying *a)
@@ -344,9 +336,9 @@ npg_status npg_apply(npg_applied *applied, const npg_apply_settings *settings)
     NPG_REQUIRE(applied && own.job && own.mesh && own.output);
     if (!own.prefix) own.prefix = "frame";
     if (own.fps_scale < 1) own.fps_scale = 1;
-    applying a = {.s = &own, .applied = &found, .arena = {.purpose = NPG_FOR_MESH}};
+    applying a = {.s = &own, .applied = &found, .files = json_array(), .arena = {.purpose = NPG_FOR_MESH}};
     npg_status status = apply(&a);
-    npg_file_discard(&a.done.file);
+    json_decref(a.files);
     npg_attach_close(&a.attachment);
     npg_mesh_unref(&a.reference);
     npg_mesh_unref(&a.carried);

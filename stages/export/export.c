@@ -445,31 +445,24 @@ static json_t *json_of_options(const npg_options *options)
 
 static npg_status conclude(npg_worker *worker)
 {
-    const export_state *state = npg_worker_state(worker);
-    json_t *whole = npg_worker_run_report(worker), *head = json_object();
-    if (!output_of(worker)[0]) {
-        json_decref(head);
-        return NPG_OK;
-    }
-    npg_status status = read_options(worker);
-    set_centre(npg_worker_state(worker), &npg_worker_facts(worker)->box);
-    if (!status) status = npg_json_write(output_of(worker), "report.json", whole);
-    json_object_set_new(head, "neupig", json_string(npg_version()));
-    json_object_set(head, "status", json_object_get(whole, "status"));
-    json_object_set(head, "exit_code", json_object_get(whole, "exit_code"));
-    json_object_set_new(head, "frames", json_integer((json_int_t)npg_worker_facts(worker)->frame_count));
-    json_object_set(
-        head, "verdict",
-        json_object_get(json_object_get(json_object_get(whole, "stages"), "evaluate"), "verdict"));
-    json_object_set(head, "meshes", json_object_get(npg_worker_report(worker), "meshes"));
+    export_state *state = npg_worker_state(worker);
+    json_t *whole = npg_worker_run_report(worker);
+    const char *output = output_of(worker);
+    if (!output[0]) return NPG_OK;
+    NPG_TRY(read_options(worker));
+    set_centre(state, &npg_worker_facts(worker)->box);
+    NPG_TRY(npg_json_write(output, "report.json", whole));
+    json_t *head =
+        json_pack("{ss sO sO sI sO* sO*}", "neupig", npg_version(), "status",
+                  json_object_get(whole, "status"), "exit_code", json_object_get(whole, "exit_code"),
+                  "frames", (json_int_t)npg_worker_facts(worker)->frame_count, "verdict",
+                  npg_json_at(whole, "stages.evaluate.verdict"), "meshes",
+                  json_object_get(npg_worker_report(worker), "meshes"));
     report_settings(head, state);
     json_object_set_new(head, "options", json_of_options(npg_worker_options(worker)));
-    if (!status) {
-        NPG_TRY(npg_done_write(output_of(worker), head, npg_exporters_any(&state->choice)));
-        return npg_job_end(npg_job_of(worker));
-    }
+    npg_status status = npg_done_end(output, head, npg_exporters_any(&state->choice));
     json_decref(head);
-    return status;
+    return status ? status : npg_job_end(npg_job_of(worker));
 }
 
 /* ---- the stage ---- */

@@ -118,7 +118,7 @@ npg_status npg_exporters_check(const npg_export_choice *choice, const npg_export
 uint64_t npg_exporters_bytes(const npg_export_choice *choice, const npg_export_facts *facts)
 {
     uint64_t sum = 0;
-    for (int i = 0; npg_exporters[i]; i++)
+    for (int i = 0; npg_exporters[i] && facts->pose_count > 0; i++)
         if (choice->is_chosen[i] && npg_exporters[i]->bytes) sum += npg_exporters[i]->bytes(facts);
     return sum;
 }

@@ -81,7 +81,7 @@ typedef struct npg_exporter {
     /* NPG_USAGE when the format can't hold such a capture (vert_count at most, pose_count -1 where unknown).
      * May be NULL. */
     npg_status (*check)(const npg_export_facts *facts);
-    uint64_t (*bytes)(const npg_export_facts *facts); /* on disk, about; 0: can't be told */
+    uint64_t (*bytes)(const npg_export_facts *facts); /* on disk, about; pose_count is known */
     npg_status (*open)(void *state);
     npg_status (*pose)(void *state, const npg_pose *pose); /* in the order of time */
     npg_status (*finish)(void *state);
@@ -152,25 +152,16 @@ npg_status npg_folder_has_room(const char *output, uint64_t bytes);
 npg_status npg_folder_check(const char *output, const npg_mesh_names *names, const int64_t *numbers,
                             size_t number_count);
 
-/* ---- the last file ---- */
+/* ---- done.json, the last file ---- */
 
-/* A done.json that is being written: within its list of files. */
-typedef struct npg_done {
-    npg_file *file;
-    size_t count; /* of entries so far */
-} npg_done;
+/* Add the entry of OUT/<name> to a list of files, with the size and checksum that it has now. */
+npg_status npg_done_add(json_t *files, const char *output, const char *name);
 
-/* Add an entry (consumed), or that of OUT/<name>, whose size and checksum are taken now. */
-npg_status npg_done_add(npg_done *done, json_t *entry);
-npg_status npg_done_add_file(npg_done *done, const char *output, const char *name);
+/* OUT/done.json of what stands at its head, and the list of files. */
+npg_status npg_done_write(const char *output, const json_t *head, const json_t *files);
 
-/* All is written, or has failed, and status comes back.  What fails at its last step is not done: then the file
- * goes, though it may be whole. */
-npg_status npg_done_end(npg_done *done, const char *output, npg_status status);
-
-/* OUT/done.json: version, status, settings, and every file of the run, with has_exports those that
- * OUT/exports.jsonl lists too; the frame log goes.  head is consumed. */
-npg_status npg_done_write(const char *output, json_t *head, bool has_exports);
+/* The same with every file of a run, with has_exports those that OUT/exports.jsonl lists too; the frame log goes. */
+npg_status npg_done_end(const char *output, const json_t *head, bool has_exports);
 
 /* ---- what the OBJ writers share ---- */
 
@@ -227,33 +218,6 @@ npg_glb_places npg_glb_places_of(const npg_glb_layout *layout);
 /* The JSON, padded with blanks to *length bytes; 0: to as many as it takes when ranges and times are known,
  * too, so that they can be put in when all is written.  To be given to npg_release(). */
 npg_status npg_glb_text(char **text, size_t *length, const npg_glb_layout *layout);
-
-/* ---- a ZIP file of members that are not compressed ---- */
-
-#define NPG_ZIP_NAME 64
-
-typedef struct npg_zip_member {
-    char name[NPG_ZIP_NAME];
-    uint64_t size;
-    /* kept by the functions below */
-    uint64_t header_at, data_at, filled;
-    uint32_t crc;
-} npg_zip_member;
-
-typedef struct npg_zip {
-    npg_file *file;          /* a loan */
-    npg_zip_member *members; /* a loan */
-    size_t count;
-} npg_zip;
-
-/* Begin an open file: names and sizes of all members are set.  The last one is the longest for speed. */
-npg_status npg_zip_open(npg_zip *zip, npg_file *file, npg_zip_member *members, size_t count);
-
-/* The next bytes of a member.  Those of the last one go straight to the end of the file. */
-npg_status npg_zip_put(npg_zip *zip, size_t member, const void *data, size_t size);
-
-/* Write the directory; all members must be full. */
-npg_status npg_zip_finish(npg_zip *zip);
 
 /* ---- scenes to draw: a mesh, or a cloud as small balls, with colours ---- */
 

@@ -33,7 +33,7 @@ static npg_status check(const npg_export_facts *facts)
 
 static uint64_t bytes(const npg_export_facts *facts)
 {
-    return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * (12 * facts->vert_count + 4);
+    return (uint64_t)facts->pose_count * (12 * facts->vert_count + 4);
 }
 
 static npg_status open_pc2(void *state)

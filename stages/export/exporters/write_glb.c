@@ -123,7 +123,7 @@ static npg_status check_glb(const npg_export_facts *facts)
 /* A frame is a row per vertex, and about 1500 bytes of JSON. */
 static uint64_t bytes(const npg_export_facts *facts)
 {
-    return facts->pose_count < 1 ? 0 : (uint64_t)facts->pose_count * (12 * facts->vert_count + 1500);
+    return (uint64_t)facts->pose_count * (12 * facts->vert_count + 1500);
 }
 
 /* ---- pieces of the binary part ---- */

@@ -30,7 +30,7 @@ npg_status npg_write_obj_pose(const char *path, const npg_export_facts *facts, c
 static uint64_t bytes(const npg_export_facts *facts)
 {
     uint64_t per_vert = facts->has_normals ? 100 : 70; /* with its two faces, about */
-    return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * facts->vert_count * per_vert;
+    return (uint64_t)facts->pose_count * facts->vert_count * per_vert;
 }
 
 static npg_status open_sequence(void *state)

@@ -144,7 +144,7 @@ static npg_status print_colour_samples(usda_state *s)
 static uint64_t bytes(const npg_export_facts *facts)
 {
     uint64_t pose = facts->vert_count * 36 + EXTENT_SIZE + colours_size(facts);
-    return facts->pose_count < 0 ? 0 : (uint64_t)facts->pose_count * pose;
+    return (uint64_t)facts->pose_count * pose;
 }
 
 static npg_status open_usda(void *state)

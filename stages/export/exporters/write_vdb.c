@@ -20,7 +20,7 @@ typedef struct vdb_state {
 static uint64_t bytes(const npg_export_facts *facts)
 {
     double cells = 2 / (facts->voxel_share * facts->voxel_share);
-    return facts->pose_count < 0 ? 0 : (uint64_t)((double)facts->pose_count * cells * 12);
+    return (uint64_t)((double)facts->pose_count * cells * 12);
 }
 
 static npg_status check(const npg_export_facts *facts)
