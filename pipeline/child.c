@@ -189,7 +189,7 @@ static npg_status exchange(child *c)
 
 /* ---- end ---- */
 
-static void keep_last_line(char *text)
+void npg_keep_last_line(char *text)
 {
     size_t length = strlen(text);
     while (length && (text[length - 1] == '\n' || text[length - 1] == '\r')) text[--length] = 0;
@@ -219,7 +219,7 @@ static npg_status reap(child *c, npg_status status)
     if (status) kill(c->pid, SIGKILL);
     do pid = waitpid(c->pid, &how, 0);
     while (pid < 0 && errno == EINTR);
-    keep_last_line(c->result->last_line);
+    npg_keep_last_line(c->result->last_line);
     return status || pid < 0 ? status : judge(c, how);
 }
 

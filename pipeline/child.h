@@ -35,6 +35,9 @@ typedef struct npg_child_result {
  * Threads: any number at a time. */
 npg_status npg_child_run(npg_child_result *result, const npg_child_job *job);
 
+/* Keep the last line of a text, without its end. */
+void npg_keep_last_line(char *text);
+
 /* Find a file of this installation that can be read: beside this program or this library, or in PREFIX/<folder>
  * ("libexec/neupig/") as seen from there. */
 bool npg_find_installed(char path[4096], const char *folder, const char *name);

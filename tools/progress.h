@@ -3,6 +3,7 @@
 #define NPG_PROGRESS_H
 
 #include <jansson.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -67,16 +68,16 @@ void npg_spell_time(char *out, size_t size, double seconds);
 
 /* ---- what the verbs that start runs share (verb_run.c) ---- */
 
-/* Holds the process id of the batch that a run belongs to. */
-#define NPG_PARENT_VARIABLE "NEUPIG_BATCH_PID"
+/* Block SIGINT, SIGTERM and SIGHUP, where they are not ignored, and `more`; *all: those that are, for one thread to wait
+ * for, *before: the mask to go back to. */
+void npg_signals_block(sigset_t *all, sigset_t *before, int more);
 
 /* A run from its start to its end.  SIGINT, SIGTERM and SIGHUP stop it; when it does not end in time the
  * process does, with exit code 75: a run can be resumed from what is on disk at any moment. */
 npg_status npg_run_job(const npg_options *options, npg_reporter *reporter);
 
-/* The same without the reporter's closing record, for one run of several.  *is_open: its options were
- * good. */
-npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool *is_open);
+/* The same without the reporter's closing record, for one run of several. */
+npg_status npg_run_once(const npg_options *options, npg_reporter *reporter);
 
 /* Where the results are, on standard output; how it ended, on standard error. */
 void npg_run_job_results(const char *verb, const char *output, npg_status status);

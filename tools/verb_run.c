@@ -3,11 +3,9 @@
 #include <pthread.h>
 #include <signal.h>
 #include <stddef.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "pipeline/child.h"
 #include "pipeline/clock.h"
 #include "pipeline/json_file.h"
 #include "tools/cli.h"
@@ -48,16 +46,16 @@ typedef struct watcher {
 
 /* Signals are blocked in every thread and waited for in one, so that no handler ever runs: the OpenCL
  * compiler installs one itself, which removes files that other threads are at work on. */
-static void block_signals(watcher *w)
+void npg_signals_block(sigset_t *all, sigset_t *before, int more)
 {
     static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
-    sigemptyset(&w->all);
+    sigemptyset(all);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
         struct sigaction now;
-        if (!sigaction(numbers[i], NULL, &now) && now.sa_handler != SIG_IGN) sigaddset(&w->all, numbers[i]);
+        if (!sigaction(numbers[i], NULL, &now) && now.sa_handler != SIG_IGN) sigaddset(all, numbers[i]);
     }
-    sigaddset(&w->all, SIGUSR1); /* the run has ended */
-    pthread_sigmask(SIG_BLOCK, &w->all, &w->before);
+    sigaddset(all, more);
+    pthread_sigmask(SIG_BLOCK, all, before);
 }
 
 /* The next signal, or -1 when none came in time. */
@@ -101,12 +99,6 @@ static void *watch_signals(void *argument)
     pthread_sigmask(SIG_UNBLOCK, &w->all, NULL);
     raise(number);
     return NULL;
-}
-
-/* A run that a batch started stops when the batch is gone, however that ended. */
-static void stop_with_parent(void)
-{
-    npg_end_with_parent(getenv(NPG_PARENT_VARIABLE), SIGTERM);
 }
 
 static npg_status start_watching(watcher *w, npg_run *run)
@@ -157,15 +149,13 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
     print_verdict(output);
 }
 
-npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool *is_open)
+npg_status npg_run_once(const npg_options *options, npg_reporter *reporter)
 {
     npg_hooks hooks = npg_reporter_hooks(reporter);
     npg_run *run = NULL;
     watcher signals = {.run = NULL};
-    block_signals(&signals);
-    stop_with_parent();
+    npg_signals_block(&signals.all, &signals.before, SIGUSR1); /* which says that the run has ended */
     npg_status status = npg_run_open(&run, options, &hooks);
-    *is_open = !status;
     if (!status) status = start_watching(&signals, run);
     if (!status) status = npg_run_wait(run);
     end_watching(&signals);
@@ -175,8 +165,7 @@ npg_status npg_run_once(const npg_options *options, npg_reporter *reporter, bool
 
 npg_status npg_run_job(const npg_options *options, npg_reporter *reporter)
 {
-    bool is_open;
-    npg_status status = npg_run_once(options, reporter, &is_open);
+    npg_status status = npg_run_once(options, reporter);
     npg_reporter_end(reporter, status, npg_options_get(options, "output"));
     return status;
 }

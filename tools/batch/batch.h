@@ -95,12 +95,10 @@ typedef enum npg_stop_cause { NPG_STOP_NONE, NPG_STOP_TIME, NPG_STOP_REQUEST } n
 typedef struct npg_process {
     npg_capture *capture; /* loan; NULL: nothing runs in this place */
     pid_t pid;
-    int out, err;                     /* this end of its standard output and error; -1: closed */
-    char line[4096], last_error[512]; /* the line that is coming in; its last whole line on standard error */
-    size_t line_length, err_length;
-    char err_line[512];
-    json_t *progress, *end;  /* its last records of these kinds, owned; may be NULL */
-    double begun_s, asked_s; /* asked_s: when it was first asked to end, 0 before that */
+    int out, err;            /* its standard output and error; -1: closed               */
+    json_t *progress;        /* its last record of that kind, owned; may be NULL        */
+    double begun_s, asked_s; /* asked_s: when it was first asked to end, 0 before that  */
+    double reported_s;       /* when its progress was reported last                     */
     npg_stop_cause cause;
     bool was_killed;
     long long done_before[3]; /* device, inode and time of done.json before the start; 0: none */
@@ -109,8 +107,8 @@ typedef struct npg_process {
 /* Start the run of a capture: its folder, its log, the child.  NPG_DISK, NPG_FAILED. */
 npg_status npg_process_start(npg_process *process, npg_capture *capture);
 
-/* Read what has come; *advanced: there is new progress. */
-void npg_process_read(npg_process *process, bool *advanced);
+/* Read what has come; whether there is new progress. */
+bool npg_process_read(npg_process *process);
 
 /* Stop it when it takes too long, kill it when it does not end although asked. */
 void npg_process_watch(npg_process *process);
@@ -126,6 +124,9 @@ npg_status npg_process_reap(npg_process *process, bool *ended);
 /* From what waitpid() gave, with the cause; words: the run's own last ones. */
 void npg_verdict_judge(npg_verdict *verdict, const npg_capture *capture, int how, npg_stop_cause cause,
                        const char *words);
+
+/* Of a run that could not be started or waited for. */
+void npg_verdict_fail(npg_verdict *verdict, npg_status status, const char *message);
 
 /* Of a capture that is not started because of its refusal: bad input.  In its folder, as any other. */
 npg_status npg_verdict_refuse(npg_capture *capture);

@@ -4,15 +4,16 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "pipeline/child.h"
 #include "pipeline/clock.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
@@ -21,30 +22,21 @@
 
 #define GRACE_SECONDS 10 /* a run that was asked ends within 5 s; then it is killed */
 
-extern char **environ;
-
 /* ---- the command ---- */
 
 typedef struct command {
-    char **words; /* each owned; ends with NULL */
+    npg_arena arena; /* of the words */
+    char **words;    /* ends with NULL */
     size_t count, room;
 } command;
 
 static npg_status add_word(command *c, const char *name, const char *value)
 {
-    char *word;
     size_t size = strlen(name) + strlen(value) + 4;
-    NPG_TRY(npg_grow(&c->words, &c->room, c->count + 2, sizeof *c->words, NPG_FOR_RUN));
-    NPG_TRY(npg_alloc(&word, NPG_FOR_RUN, size));
-    snprintf(word, size, "%s%s%s%s", *value ? "--" : "", name, *value ? "=" : "", value);
-    c->words[c->count++] = word;
-    return NPG_OK;
-}
-
-static void clear_command(command *c)
-{
-    for (size_t i = 0; i < c->count; i++) npg_release(&c->words[i]);
-    npg_release(&c->words);
+    NPG_TRY(npg_arena_grow(&c->arena, &c->words, &c->room, c->count + 2, sizeof *c->words));
+    char *word = c->words[c->count++] = npg_arena_take(&c->arena, size, 1);
+    if (word) snprintf(word, size, "%s%s%s%s", *value ? "--" : "", name, *value ? "=" : "", value);
+    return npg_arena_status(&c->arena);
 }
 
 /* What is set, as --<option>=<value>; the keys of the method as one object. */
@@ -115,48 +107,39 @@ static void log_command(const npg_capture *capture, const command *c)
     log_record(capture, json_pack("{s:s,s:o}", "event", "command", "command", words));
 }
 
-/* In its own process group, so that a signal from the terminal reaches it through this process alone and
- * that it can be killed with all that it has started; with no signal blocked. */
-static npg_status spawn(npg_process *p, const command *c, int out, int err)
+/* What the child does first.  In its own process group, so that a signal from the terminal reaches it through this
+ * process alone and that it can be killed with all that it has started; with no signal blocked; and it stops when the
+ * batch is gone, however that ended. */
+static void become_run(const npg_process *p, const command *c, const char *parent)
 {
-    posix_spawn_file_actions_t actions;
-    posix_spawnattr_t attributes;
     sigset_t none;
-    char parent[32];
-    snprintf(parent, sizeof parent, "%ld", (long)getpid());
-    setenv(NPG_PARENT_VARIABLE, parent, 1);
-    posix_spawn_file_actions_init(&actions);
-    posix_spawnattr_init(&attributes);
-    posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_adddup2(&actions, out, 1);
-    posix_spawn_file_actions_adddup2(&actions, err, 2);
-    posix_spawn_file_actions_addclosefrom_np(&actions, 3);
+    int nothing = open("/dev/null", O_RDONLY);
+    setpgid(0, 0);
+    npg_end_with_parent(parent, SIGTERM);
+    dup2(nothing, STDIN_FILENO);
+    dup2(p->out, STDOUT_FILENO);
+    dup2(p->err, STDERR_FILENO);
     sigemptyset(&none);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setpgroup(&attributes, 0);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETPGROUP);
-    int error = posix_spawn(&p->pid, "/proc/self/exe", &actions, &attributes, c->words, environ);
-    posix_spawn_file_actions_destroy(&actions);
-    posix_spawnattr_destroy(&attributes);
-    unsetenv(NPG_PARENT_VARIABLE);
-    errno = error;
-    return error ? npg_error_errno(NPG_FAILED, "can't start neupig run") : NPG_OK;
+    sigprocmask(SIG_SETMASK, &none, NULL);
+    closefrom(3);
+    execv("/proc/self/exe", c->words);
+    _exit(127);
 }
 
-static npg_status open_pipes(npg_process *p, const command *c)
+/* Its output goes to files without a name, so that it never waits for anybody to read. */
+static npg_status start(npg_process *p, const command *c)
 {
-    int out[2] = {-1, -1}, err[2] = {-1, -1};
-    npg_status status = NPG_OK;
-    if (pipe2(out, O_CLOEXEC) || pipe2(err, O_CLOEXEC))
-        status = npg_error_errno(NPG_FAILED, "can't make a pipe to neupig run");
-    if (!status) status = spawn(p, c, out[1], err[1]);
-    if (out[1] >= 0) close(out[1]);
-    if (err[1] >= 0) close(err[1]);
-    p->out = out[0];
-    p->err = err[0];
-    if (p->out >= 0) fcntl(p->out, F_SETFL, O_NONBLOCK);
-    if (p->err >= 0) fcntl(p->err, F_SETFL, O_NONBLOCK);
-    return status;
+    char parent[24];
+    snprintf(parent, sizeof parent, "%ld", (long)getpid());
+    p->out = memfd_create("output", MFD_CLOEXEC);
+    p->err = memfd_create("errors", MFD_CLOEXEC);
+    if (p->out < 0 || p->err < 0 || fcntl(p->out, F_SETFL, O_APPEND) || fcntl(p->err, F_SETFL, O_APPEND))
+        return npg_error_errno(NPG_FAILED, "can't take the output of neupig run");
+    p->pid = fork();
+    if (p->pid < 0) return npg_error_errno(NPG_FAILED, "can't start neupig run");
+    if (p->pid == 0) become_run(p, c, parent);
+    setpgid(p->pid, p->pid); /* whoever is first */
+    return NPG_OK;
 }
 
 static void clear(npg_process *p)
@@ -164,13 +147,12 @@ static void clear(npg_process *p)
     if (p->out >= 0) close(p->out);
     if (p->err >= 0) close(p->err);
     json_decref(p->progress);
-    json_decref(p->end);
     *p = (npg_process){.out = -1, .err = -1};
 }
 
 npg_status npg_process_start(npg_process *p, npg_capture *capture)
 {
-    command c = {0};
+    command c = {.arena = {.purpose = NPG_FOR_RUN}};
     char log_path[NPG_PATH_SIZE];
     *p = (npg_process){.capture = capture, .out = -1, .err = -1, .begun_s = npg_clock_s()};
     npg_status status = npg_make_folder(capture->output);
@@ -179,76 +161,45 @@ npg_status npg_process_start(npg_process *p, npg_capture *capture)
     if (!status) status = npg_path_of(log_path, capture->output, "log.jsonl");
     if (!status) status = make_command(&c, capture, log_path);
     if (!status) log_command(capture, &c);
-    if (!status) status = open_pipes(p, &c);
-    clear_command(&c);
+    if (!status) status = start(p, &c);
+    npg_arena_release(&c.arena);
     if (status) clear(p);
     return status;
 }
 
 /* ---- what it says ---- */
 
-static void keep_record(npg_process *p, const char *line, bool *advanced)
+/* The last line of a file, as far as it is written. */
+static void read_last_line(char *text, size_t size, int fd)
 {
-    json_t *record = json_loads(line, 0, NULL);
-    const char *event = json_string_value(json_object_get(record, "event"));
-    json_t **kept = event && !strcmp(event, "progress") ? &p->progress
-                    : event && !strcmp(event, "end")    ? &p->end
-                                                        : NULL;
-    if (kept == &p->progress && kept) *advanced = true;
-    if (kept) {
-        json_decref(*kept);
-        *kept = json_incref(record);
-    }
-    json_decref(record);
+    off_t end = lseek(fd, 0, SEEK_END), most = (off_t)size - 1;
+    ssize_t got = pread(fd, text, size - 1, end > most ? end - most : 0);
+    text[got > 0 ? got : 0] = 0;
+    npg_keep_last_line(text);
 }
 
-/* Read what there is; false at the end of the stream. */
-static bool read_some(int *fd, char *text, size_t size, size_t *got)
-{
-    ssize_t count = *fd >= 0 ? read(*fd, text, size) : 0;
-    *got = count > 0 ? (size_t)count : 0;
-    if (count > 0) return true;
-    if (*fd >= 0 && (count == 0 || (errno != EAGAIN && errno != EINTR))) {
-        close(*fd);
-        *fd = -1;
-    }
-    return false;
-}
-
-/* Lines that are too long are cut. */
-static bool add_to_line(char *line, size_t size, size_t *length, char c)
-{
-    if (c == '\n') {
-        line[*length] = 0;
-        *length = 0;
-        return true;
-    }
-    if (*length + 1 < size) line[(*length)++] = c;
-    return false;
-}
-
-void npg_process_read(npg_process *p, bool *advanced)
+bool npg_process_read(npg_process *p)
 {
     char text[4096];
-    size_t got;
-    *advanced = false;
-    while (read_some(&p->out, text, sizeof text, &got))
-        for (size_t i = 0; i < got; i++)
-            if (add_to_line(p->line, sizeof p->line, &p->line_length, text[i]))
-                keep_record(p, p->line, advanced);
-    while (read_some(&p->err, text, sizeof text, &got))
-        for (size_t i = 0; i < got; i++)
-            if (add_to_line(p->err_line, sizeof p->err_line, &p->err_length, text[i]) && p->err_line[0])
-                snprintf(p->last_error, sizeof p->last_error, "%s", p->err_line);
+    read_last_line(text, sizeof text, p->out);
+    json_t *record = json_loads(text, 0, NULL);
+    const char *event = json_string_value(json_object_get(record, "event"));
+    bool is_progress = event && !strcmp(event, "progress");
+    if (record && ftruncate(p->out, 0)) is_progress = false; /* what was read is not kept */
+    if (is_progress) {
+        json_decref(p->progress);
+        p->progress = json_incref(record);
+    }
+    json_decref(record);
+    return is_progress;
 }
 
-/* Why it failed: its closing record, or the last that it wrote to standard error. */
-static const char *failure_text(const npg_process *p)
+/* Why it failed: the last that it wrote to standard error. */
+static const char *failure_text(char *text, size_t size, const npg_process *p)
 {
-    const char *message = json_string_value(json_object_get(p->end, "message"));
     const char *prefix = "neupig run: ";
-    if (message) return message;
-    return !strncmp(p->last_error, prefix, strlen(prefix)) ? p->last_error + strlen(prefix) : p->last_error;
+    read_last_line(text, size, p->err);
+    return !strncmp(text, prefix, strlen(prefix)) ? text + strlen(prefix) : text;
 }
 
 /* ---- limits ---- */
@@ -295,8 +246,9 @@ static npg_status conclude(npg_process *p, int how, const struct rusage *used)
 {
     npg_capture *capture = p->capture;
     npg_verdict *v = &capture->verdict, before;
+    char text[sizeof v->message];
     npg_verdict_read(&before, capture);
-    npg_verdict_judge(v, capture, how, p->cause, failure_text(p));
+    npg_verdict_judge(v, capture, how, p->cause, failure_text(text, sizeof text, p));
     v->was_done = was_done(p, how);
     bool keeps = v->was_done && before.is_known;
     v->seconds = keeps ? before.seconds : npg_clock_s() - p->begun_s;
@@ -311,13 +263,11 @@ static npg_status conclude(npg_process *p, int how, const struct rusage *used)
 npg_status npg_process_reap(npg_process *p, bool *ended)
 {
     int how;
-    bool unused;
     struct rusage used;
     siginfo_t info = {.si_pid = 0};
     waitid(P_PID, (id_t)p->pid, &info, WEXITED | WNOHANG | WNOWAIT);
     *ended = info.si_pid == p->pid;
     if (!*ended) return NPG_OK;
-    npg_process_read(p, &unused);
     kill(-p->pid, SIGKILL); /* a helper that outlived it; the group exists until the process is waited for */
     if (wait4(p->pid, &how, 0, &used) != p->pid)
         return npg_error_errno(NPG_FAILED, "%s: its run can't be waited for", p->capture->name);

@@ -2,12 +2,9 @@
 #include "tools/batch/batch.h"
 
 #include <math.h>
-#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/signalfd.h>
-#include <unistd.h>
 
 #include "pipeline/clock.h"
 #include "pipeline/json_file.h"
@@ -22,10 +19,9 @@ typedef struct work {
     npg_reporter *reporter;
     npg_hooks hooks;
     npg_process *processes; /* `places` of them, owned */
-    double *reported_s;     /* when each one's progress was reported last, owned */
     size_t places, running, next, mine, ended;
-    size_t worked; /* captures ended that were not done before */
-    int signals;   /* signalfd, -1: none */
+    size_t worked;    /* captures ended that were not done before */
+    sigset_t signals; /* that are waited for */
     double begun_s, stopped_s;
     bool stopped;
 } work;
@@ -60,11 +56,6 @@ static void report_end(work *w, const npg_capture *capture)
 
 /* ---- progress ---- */
 
-static double share_of(const npg_process *p)
-{
-    return p->capture && p->progress ? json_number_value(json_object_get(p->progress, "share")) : 0;
-}
-
 /* What was done before took no time, so it is left out of the estimate of the rest. */
 static void report_progress(work *w)
 {
@@ -72,8 +63,10 @@ static void report_progress(work *w)
            elapsed_s = npg_clock_s() - w->begun_s;
     const char *name = "";
     for (size_t i = 0; i < w->places; i++) {
-        done += share_of(&w->processes[i]);
-        if (w->processes[i].capture) name = w->processes[i].capture->name;
+        const npg_process *p = &w->processes[i];
+        if (!p->capture) continue;
+        done += json_number_value(json_object_get(p->progress, "share"));
+        name = p->capture->name;
     }
     double all = (double)w->mine - skipped;
     npg_progress progress = {.struct_size = sizeof progress,
@@ -87,12 +80,11 @@ static void report_progress(work *w)
     if (w->reporter->show == NPG_SHOW_BAR) w->hooks.progress(w->hooks.user, &progress);
 }
 
-static void print_progress(work *w, size_t i)
+static void print_progress(const work *w, npg_process *p)
 {
-    npg_process *p = &w->processes[i];
     double now_s = npg_clock_s();
-    if (w->reporter->show != NPG_SHOW_JSON || now_s < w->reported_s[i] + RECORD_SECONDS) return;
-    w->reported_s[i] = now_s;
+    if (w->reporter->show != NPG_SHOW_JSON || now_s < p->reported_s + RECORD_SECONDS) return;
+    p->reported_s = now_s;
     json_t *record = json_pack("{s:s,s:o}", "event", "progress", "name", npg_json_text(p->capture->name));
     json_object_update_missing(record, p->progress);
     npg_reporter_print(w->reporter, record);
@@ -100,34 +92,22 @@ static void print_progress(work *w, size_t i)
 
 /* ---- signals ---- */
 
-static npg_status block_signals(work *w, sigset_t *before)
-{
-    static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
-    sigset_t all;
-    sigemptyset(&all);
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
-        struct sigaction now;
-        if (!sigaction(numbers[i], NULL, &now) && now.sa_handler != SIG_IGN) sigaddset(&all, numbers[i]);
-    }
-    sigprocmask(SIG_BLOCK, &all, before);
-    w->signals = signalfd(-1, &all, SFD_CLOEXEC | SFD_NONBLOCK);
-    return w->signals >= 0 ? NPG_OK : npg_error_errno(NPG_FAILED, "signals can't be read");
-}
-
 static void stop_all(work *w)
 {
     for (size_t i = 0; i < w->places; i++)
         if (w->processes[i].capture) npg_process_stop(&w->processes[i], NPG_STOP_REQUEST);
 }
 
-static void read_signals(work *w)
+/* Wait for a signal, the end of a run among them, or the next look, and take all that have come. */
+static void take_signals(work *w, long wait_ms)
 {
-    struct signalfd_siginfo info;
-    while (read(w->signals, &info, sizeof info) == sizeof info) {
+    int number;
+    for (; (number = sigtimedwait(&w->signals, NULL, &(struct timespec){.tv_nsec = 1000000 * wait_ms})) > 0;
+         wait_ms = 0) {
         double now_s = npg_clock_s();
-        if (w->stopped && now_s < w->stopped_s + AGAIN_SECONDS) continue;
+        if (number == SIGCHLD || (w->stopped && now_s < w->stopped_s + AGAIN_SECONDS)) continue;
         if (!w->stopped)
-            npg_reporter_log(w->reporter, NPG_LOG_WARNING, npg_clock_s() - w->begun_s, "batch",
+            npg_reporter_log(w->reporter, NPG_LOG_WARNING, now_s - w->begun_s, "batch",
                              "stopping on request: the runs write their states");
         w->stopped = true;
         w->stopped_s = now_s;
@@ -136,14 +116,6 @@ static void read_signals(work *w)
 }
 
 /* ---- captures ---- */
-
-static void fail_capture(npg_capture *capture, npg_status status)
-{
-    npg_verdict *v = &capture->verdict;
-    *v = (npg_verdict){.is_known = true, .exit_code = npg_status_exit_code(status)};
-    snprintf(v->word, sizeof v->word, "%s", npg_status_name(status));
-    snprintf(v->message, sizeof v->message, "%s", npg_error_text());
-}
 
 static void count_end(work *w, const npg_capture *capture)
 {
@@ -160,12 +132,11 @@ static void start_next(work *w, size_t place)
     report_start(w, capture);
     npg_status status =
         capture->refusal ? npg_verdict_refuse(capture) : npg_process_start(&w->processes[place], capture);
-    w->reported_s[place] = 0;
     if (!status && !capture->refusal) {
         w->running++;
         return;
     }
-    if (status) fail_capture(capture, status);
+    if (status) npg_verdict_fail(&capture->verdict, status, npg_error_text());
     count_end(w, capture);
 }
 
@@ -179,39 +150,24 @@ static void serve_process(work *w, size_t i)
 {
     npg_process *p = &w->processes[i];
     npg_capture *capture = p->capture;
-    bool advanced, ended;
-    npg_process_read(p, &advanced);
-    if (advanced) print_progress(w, i);
+    bool ended;
+    if (npg_process_read(p)) print_progress(w, p);
     npg_process_watch(p);
     npg_status status = npg_process_reap(p, &ended);
     if (!ended) return;
-    if (status) fail_capture(capture, status);
+    if (status) npg_verdict_fail(&capture->verdict, status, npg_error_text());
     p->capture = NULL;
     w->running--;
     count_end(w, capture);
 }
 
-static void wait_for_events(work *w)
-{
-    enum { ENDS_MAX = 512 };
-    struct pollfd ends[ENDS_MAX + 1] = {{w->signals, POLLIN, 0}};
-    nfds_t count = 1;
-    for (size_t i = 0; i < w->places && count + 1 < ENDS_MAX; i++) {
-        if (!w->processes[i].capture) continue;
-        ends[count++] = (struct pollfd){w->processes[i].out, POLLIN, 0};
-        ends[count++] = (struct pollfd){w->processes[i].err, POLLIN, 0};
-    }
-    poll(ends, count, TICK_MS);
-}
-
 static void run_all(work *w)
 {
     for (;;) {
-        read_signals(w);
         start_some(w);
         if (!w->running) return;
         report_progress(w);
-        wait_for_events(w);
+        take_signals(w, TICK_MS);
         for (size_t i = 0; i < w->places; i++)
             if (w->processes[i].capture) serve_process(w, i);
     }
@@ -221,8 +177,7 @@ static npg_status open_places(work *w, size_t jobs)
 {
     for (size_t i = 0; i < w->batch->count; i++) w->mine += npg_batch_is_mine(w->batch, i);
     w->places = jobs < w->mine ? jobs : w->mine;
-    NPG_TRY(npg_alloc_array(&w->processes, NPG_FOR_RUN, w->places, sizeof *w->processes));
-    return npg_alloc_array(&w->reported_s, NPG_FOR_RUN, w->places, sizeof *w->reported_s);
+    return npg_alloc_array(&w->processes, NPG_FOR_RUN, w->places, sizeof *w->processes);
 }
 
 npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, bool *stopped)
@@ -230,22 +185,17 @@ npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, 
     work w = {.batch = batch,
               .reporter = reporter,
               .hooks = npg_reporter_hooks(reporter),
-              .signals = -1,
               .begun_s = npg_clock_s()};
     sigset_t before;
     npg_status status = open_places(&w, jobs);
-    if (!status) status = block_signals(&w, &before);
-    if (!status) {
-        run_all(&w);
-        read_signals(&w); /* one that came at the very end */
-        close(w.signals);
-        sigprocmask(SIG_SETMASK, &before, NULL);
-    }
+    npg_signals_block(&w.signals, &before, SIGCHLD);
+    if (!status) run_all(&w);
+    take_signals(&w, 0); /* one that came at the very end */
+    sigprocmask(SIG_SETMASK, &before, NULL);
     for (size_t i = 0; i < batch->count; i++)
         if (!batch->captures[i].verdict.is_known)
             npg_verdict_read(&batch->captures[i].verdict, &batch->captures[i]);
     *stopped = w.stopped;
     npg_release(&w.processes);
-    npg_release(&w.reported_s);
     return status;
 }

@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "pipeline/file.h"
@@ -38,13 +37,12 @@ static npg_status add_frame(void *user, const json_t *line, const char *text, si
     return NPG_OK;
 }
 
-/* folder: that of the capture, or "/" and a segment's in it. */
 static npg_status read_folder(figures *f, const npg_capture *capture, const char *folder)
 {
-    char path[4096];
-    struct stat info;
-    snprintf(path, sizeof path, "%s/%s/frames.jsonl", capture->output, folder);
-    return stat(path, &info) ? NPG_OK : npg_json_lines_each(path, info.st_size, add_frame, f);
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, capture->output, folder));
+    return npg_is_in_folder(path, "frames.jsonl") ? npg_json_lines_in(path, "frames.jsonl", add_frame, f)
+                                                  : NPG_OK;
 }
 
 static npg_status read_capture(figures *f, const npg_capture *capture)

@@ -70,10 +70,15 @@ void npg_verdict_judge(npg_verdict *v, const npg_capture *capture, int how, npg_
     }
 }
 
+void npg_verdict_fail(npg_verdict *v, npg_status status, const char *message)
+{
+    *v = (npg_verdict){.is_known = true};
+    set(v, npg_status_name(status), npg_status_exit_code(status), message);
+}
+
 npg_status npg_verdict_refuse(npg_capture *capture)
 {
-    capture->verdict = (npg_verdict){.is_known = true};
-    set(&capture->verdict, word_of(3), 3, capture->refusal);
+    npg_verdict_fail(&capture->verdict, NPG_BAD_INPUT, capture->refusal);
     NPG_TRY(npg_make_folder(capture->output));
     return npg_verdict_write(capture);
 }

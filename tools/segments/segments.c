@@ -104,7 +104,6 @@ static npg_status run_segment(const npg_segments *s, const npg_segment *segment,
                               npg_reporter *reporter)
 {
     npg_options *own;
-    bool is_open;
     NPG_TRY(refuse_link(s, options, segment->folder));
     NPG_TRY(npg_options_copy(&own, options));
     npg_status status = set_segment_options(own, s, segment);
@@ -112,7 +111,7 @@ static npg_status run_segment(const npg_segments *s, const npg_segment *segment,
         npg_reporter_log(reporter, NPG_LOG_INFO, 0, "segments", "%s: frames %lld to %lld", segment->folder,
                          (long long)npg_segment_number(s, segment->first),
                          (long long)npg_segment_number(s, segment->last));
-    if (!status) status = npg_run_once(own, reporter, &is_open);
+    if (!status) status = npg_run_once(own, reporter);
     npg_options_close(&own);
     return status;
 }
