@@ -115,6 +115,12 @@ bool npg_is_there(const char *path)
     return access(path, F_OK) == 0;
 }
 
+bool npg_is_folder(const char *path)
+{
+    struct stat info;
+    return !stat(path, &info) && S_ISDIR(info.st_mode);
+}
+
 bool npg_is_in_folder(const char *folder, const char *name)
 {
     char path[NPG_PATH_SIZE];

@@ -88,6 +88,7 @@ npg_status npg_hash_file(uint64_t *hash, const char *path, uint64_t limit);
 /* Whether something lies at the path, or in the folder under that name; false, too, where that can't be found
  * out. */
 bool npg_is_there(const char *path);
+bool npg_is_folder(const char *path);
 bool npg_is_in_folder(const char *folder, const char *name);
 
 /* ---- whole folders (folder.c) ---- */

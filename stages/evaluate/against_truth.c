@@ -16,7 +16,7 @@ typedef struct evaluation {
     npg_metrics_settings metrics;
     npg_eval_figures all;          /* sums of the frames' so far, then means */
     size_t frames;                 /* so far */
-    npg_arena arena;               /* of the arrays below */
+    npg_arena arena;               /* of the listings, and of the arrays below */
     npg_mesh *first, *first_truth; /* counted references */
     uint32_t *truth_of;            /* owned */
     npg_mesh_neighbours ring;
@@ -32,11 +32,9 @@ typedef struct evaluation {
 static npg_status list_side(npg_listing *listing, const char *folder, const char *subfolders,
                             const char *endings)
 {
-    char *path;
-    NPG_TRY(npg_subfolder(&path, folder, subfolders));
-    npg_status status = npg_listing_add(listing, path, endings);
-    npg_release(&path);
-    return status;
+    const char *path;
+    NPG_TRY(npg_subfolder(listing->arena, &path, folder, subfolders));
+    return npg_listing_add(listing, path, endings);
 }
 
 static npg_status select_frames(evaluation *e)
@@ -297,11 +295,10 @@ npg_status npg_eval(npg_eval_figures *all, const npg_eval_settings *settings)
     NPG_TRY(npg_struct_take(&e.s, sizeof e.s, settings, NPG_SIZE_UP_TO(npg_eval_settings, frame),
                             "the settings"));
     NPG_REQUIRE(all && e.s.predicted && e.s.truth);
+    e.predicted.arena = e.truth.arena = &e.arena;
     e.metrics = (npg_metrics_settings){
         .sample_count = e.s.samples ? e.s.samples : 100000, .tau = e.s.tau, .seed = e.s.seed};
     npg_status status = eval_all(&e);
-    npg_listing_close(&e.predicted);
-    npg_listing_close(&e.truth);
     npg_mesh_unref(&e.first);
     npg_mesh_unref(&e.first_truth);
     npg_mesh_neighbours_close(&e.ring);

@@ -25,7 +25,7 @@ typedef struct file {
 struct npg_follow {
     npg_follow_settings settings;
     char *folder, *pattern, *last; /* owned; pattern may be NULL; last: the name that was taken last */
-    char ending[16];               /* of all frames, once one was taken */
+    const char *ending;            /* of all frames, once one was taken; else NULL */
     file *files;                   /* files[begin .. count): not taken yet, in natural order; owned */
     size_t begin, count, capacity;
     size_t taken_count, late_count;
@@ -98,11 +98,17 @@ size_t npg_follow_digits(const npg_follow *follow)
     return follow->number_place;
 }
 
+/* Of the names of frames; the one that most have. */
+static void choose_ending(npg_follow *follow, const void *names, size_t count, size_t size)
+{
+    size_t most;
+    if (!follow->pattern) follow->ending = npg_ending_of_most(&most, names, count, size, NULL);
+}
+
 npg_status npg_follow_resume(npg_follow *follow, const npg_follow_place *place)
 {
-    const char *dot = strrchr(place->last, '.');
     NPG_TRY(npg_copy_text(&follow->last, place->last));
-    if (!follow->pattern && dot) strncpy(follow->ending, dot, sizeof follow->ending - 1);
+    choose_ending(follow, &follow->last, 1, sizeof follow->last);
     follow->number_place = place->digits;
     follow->number = place->number;
     follow->step = place->step;
@@ -117,7 +123,7 @@ static bool is_frame_name(const npg_follow *follow, const char *name)
     if (name[0] == '.' || !strcmp(name, follow->settings.end_name)) return false;
     if (follow->pattern) return fnmatch(follow->pattern, name, FNM_PERIOD) == 0;
     if (!npg_format_by_ending(name)) return false;
-    return !follow->ending[0] || !strcasecmp(strrchr(name, '.'), follow->ending);
+    return !follow->ending || !strcasecmp(strrchr(name, '.'), follow->ending);
 }
 
 /* Size and time of the file now, against those of the scan before. */
@@ -251,21 +257,8 @@ static int64_t number_of(const npg_follow *follow, const file *f)
  * digits in the first two names the last one that grows is the number. */
 static void choose_ending_and_number(npg_follow *follow)
 {
-    size_t best = 0, best_count = 0;
-    follow->ending[0] = 0;
     follow->number_place = 0;
-    for (size_t i = 0; i < follow->count && !follow->pattern; i++) {
-        size_t same = 0;
-        for (size_t k = 0; k < follow->count; k++)
-            same += !strcasecmp(strrchr(follow->files[i].name, '.'), strrchr(follow->files[k].name, '.'));
-        if (same > best_count) {
-            best = i;
-            best_count = same;
-        }
-        if (2 * best_count >= follow->count) break; /* no other can have more: the loop stays short */
-    }
-    if (!follow->pattern)
-        strncpy(follow->ending, strrchr(follow->files[best].name, '.'), sizeof follow->ending - 1);
+    choose_ending(follow, follow->files, follow->count, sizeof(file));
     size_t kept = 0;
     for (size_t i = 0; i < follow->count; i++) {
         if (is_frame_name(follow, follow->files[i].name))

@@ -26,62 +26,38 @@ static npg_status add_slot(npg_frame_files *list, size_t *capacity, char *path, 
     return NPG_OK;
 }
 
-/* Numbers between two frames that the selection wants although no frame has them. */
-static npg_status add_gaps(npg_frame_files *list, size_t *capacity, const npg_selection *selection,
-                           int64_t *position, int64_t from, int64_t to, int64_t step, int64_t count)
+/* All slots in time order: files, gaps between them, and selected numbers outside what is there, which are gaps, too.
+ * Positions count gaps from the first file. */
+static npg_status fill_slots(npg_frame_files *list, const npg_listing *paths, const npg_selection *selection,
+                             bool finds_gaps)
 {
-    for (int64_t number = from; number < to; number += step, ++*position)
-        if (npg_selection_takes(selection, *position, number, count))
-            NPG_TRY(add_slot(list, capacity, NULL, number));
-    return NPG_OK;
-}
-
-/* Selected numbers that lie outside what is there: before the first frame, or after the last. */
-static npg_status add_outside(npg_frame_files *list, size_t *capacity, const npg_selection *selection,
-                              int64_t first, int64_t last, int64_t step, bool before)
-{
-    for (size_t i = 0; i < selection->range_count; i++) {
-        int64_t from = selection->ranges[i][0], to = selection->ranges[i][1];
-        if (before && to >= first) to = first - 1;
-        if (!before && from <= last) from = last + 1;
-        /* Up to the next number that the capture's step leads to. */
-        from += ((first - from) % step + step) % step;
-        if (from > to) continue;
-        if ((to - from) / step >= SLOTS_MAX)
-            return npg_error(NPG_USAGE,
-                             "option frames: %lld to %lld is far from what is there (%lld to %lld)",
-                             (long long)from, (long long)to, (long long)first, (long long)last);
-        for (int64_t number = from; number <= to; number += step)
-            NPG_TRY(add_slot(list, capacity, NULL, number));
-    }
-    return NPG_OK;
-}
-
-/* All slots in time order.  Positions count gaps; numbers outside the capture have none. */
-static npg_status fill_slots(npg_frame_files *list, npg_paths *paths, const int64_t *numbers,
-                             const npg_selection *selection, bool finds_gaps)
-{
-    size_t capacity = 0;
-    int64_t step = step_of(numbers, paths->count), position = 0;
-    int64_t first = numbers[0], last = numbers[paths->count - 1];
-    int64_t count = finds_gaps ? (last - first) / step + 1 : (int64_t)paths->count;
+    const int64_t *numbers = paths->numbers, (*ranges)[2] = selection->ranges;
+    const int64_t step = step_of(numbers, paths->count), first = numbers[0], last = numbers[paths->count - 1];
+    int64_t count = finds_gaps ? (last - first) / step + 1 : (int64_t)paths->count, before = 0, behind = 0;
+    size_t capacity = 0, next = 0, range_count = selection->range_count;
     if (count > SLOTS_MAX)
         return npg_error(NPG_BAD_INPUT,
                          "the numbers of %zu frames run from %lld to %lld: "
                          "not a numbering (missing = ignore takes the frames as they follow each other)",
                          paths->count, (long long)first, (long long)last);
-    if (finds_gaps) NPG_TRY(add_outside(list, &capacity, selection, first, last, step, true));
-    for (size_t i = 0; i < paths->count; i++) {
-        if (i && finds_gaps)
-            NPG_TRY(add_gaps(list, &capacity, selection, &position, numbers[i - 1] + step, numbers[i], step,
-                             count));
-        if (npg_selection_takes(selection, position++, numbers[i], count))
-            NPG_TRY(add_slot(list, &capacity, paths->paths[i], numbers[i]));
+    if (finds_gaps && range_count && ranges[0][0] < first) before = (first - ranges[0][0]) / step;
+    if (finds_gaps && range_count && ranges[range_count - 1][1] > last)
+        behind = (ranges[range_count - 1][1] - last) / step;
+    if (before + behind > SLOTS_MAX)
+        return npg_error(NPG_USAGE, "option frames: %lld to %lld is far from what is there (%lld to %lld)",
+                         (long long)ranges[0][0], (long long)ranges[range_count - 1][1], (long long)first,
+                         (long long)last);
+    for (int64_t at = -before; at < count + behind; at++) {
+        int64_t number = finds_gaps ? first + at * step : numbers[at];
+        bool is_there = next < paths->count && numbers[next] == number;
+        if (npg_selection_takes(selection, at, number, count))
+            NPG_TRY(add_slot(list, &capacity, is_there ? paths->paths[next] : NULL, number));
+        next += is_there;
     }
-    return finds_gaps ? add_outside(list, &capacity, selection, first, last, step, false) : NPG_OK;
+    return NPG_OK;
 }
 
-static npg_status number_frames(npg_frame_files *list, npg_paths *paths)
+static npg_status number_frames(npg_frame_files *list, npg_listing *paths)
 {
     list->is_numbered = true;
     if (paths->numbers) return NPG_OK;
@@ -92,7 +68,7 @@ static npg_status number_frames(npg_frame_files *list, npg_paths *paths)
 }
 
 /* The frames of a rig as if each were a file of its own: its first depth image. */
-static npg_status find_in_rig(npg_paths *paths, const npg_rig *rig)
+static npg_status find_in_rig(npg_listing *paths, const npg_rig *rig)
 {
     paths->count = rig->frame_count;
     paths->paths = npg_arena_take(paths->arena, paths->count, sizeof *paths->paths);
@@ -109,12 +85,12 @@ static npg_status find_in_rig(npg_paths *paths, const npg_rig *rig)
 static npg_status fill(npg_frame_files *list, const char *input, const npg_selection *selection,
                        bool finds_gaps, const npg_rig_settings *rig)
 {
-    npg_paths paths = {.arena = &list->arena};
+    npg_listing paths = {.arena = &list->arena};
     if (rig) NPG_TRY(npg_rig_open(&list->rig, input, rig));
     NPG_TRY(rig ? find_in_rig(&paths, list->rig) : npg_paths_find(&paths, input));
     NPG_TRY(number_frames(list, &paths));
     list->left_out = paths.left_out;
-    NPG_TRY(fill_slots(list, &paths, paths.numbers, selection, finds_gaps && list->is_numbered));
+    NPG_TRY(fill_slots(list, &paths, selection, finds_gaps && list->is_numbered));
     if (list->count == list->gap_count)
         return npg_error(
             NPG_USAGE, "option frames: chooses none of the %zu frames of %s (numbers %lld to %lld)",
@@ -149,13 +125,14 @@ npg_status npg_frame_files_read(const npg_frame_files *list, size_t slot, npg_fr
     return status;
 }
 
-npg_status npg_frame_files_compare(const npg_frame_files *list, npg_rig_view *views)
+npg_status npg_frame_files_compare(const npg_frame_files *list, npg_rig_view **views)
 {
     size_t *frames, count = 0;
+    NPG_TRY(npg_alloc_array(views, NPG_FOR_FILES, list->rig->sensor_count, sizeof **views));
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FILES, list->count, sizeof *frames));
     for (size_t i = 0; i < list->count; i++)
         if (list->slots[i].path) frames[count++] = npg_rig_find(list->rig, list->slots[i].number);
-    npg_status status = npg_rig_compare(list->rig, views, frames, count);
+    npg_status status = npg_rig_compare(list->rig, *views, frames, count);
     npg_release(&frames);
     return status;
 }

@@ -1,4 +1,4 @@
-/* Frame inputs: the files that a folder, pattern, glob, list or single path stands for. */
+/* Frame inputs: the files that a folder, pattern, glob, list or single path stands for; listings of them. */
 #include "ingest/ingest_internal.h"
 
 #include <glob.h>
@@ -9,98 +9,84 @@
 
 #define FORMATS_TEXT "PLY, OBJ, XYZ, TXT, PTS, NPY, PCD"
 
-static npg_status add_path(npg_paths *list, char *path)
+static npg_status add_path(npg_listing *list, char *path)
 {
-    NPG_TRY(npg_arena_grow(list->arena, &list->paths, &list->capacity, list->count + 1, sizeof path));
+    NPG_TRY(npg_arena_grow(list->arena, &list->paths, &list->room, list->count + 1, sizeof path));
     list->paths[list->count++] = path;
     return NPG_OK;
 }
 
-static void sort_paths(npg_paths *list)
+static void sort_paths(npg_listing *list, size_t first)
 {
-    if (list->count) qsort(list->paths, list->count, sizeof *list->paths, npg_natural_order);
-}
-
-static bool is_folder(const char *path)
-{
-    struct stat info;
-    return !stat(path, &info) && S_ISDIR(info.st_mode);
+    if (list->count > first)
+        qsort(list->paths + first, list->count - first, sizeof *list->paths, npg_natural_order);
 }
 
 /* ---- a folder ---- */
 
-/* Names in a folder that do not begin with a dot: the sub-folders, or the files with an ending that readers know. */
+static bool ends_in(const char *name, const char *endings)
+{
+    const char *dot = strrchr(name, '.');
+    for (const char *at = endings; dot && *at; at += strspn(at, " ")) {
+        size_t length = strcspn(at, " ");
+        if (strlen(dot) == length && !strncasecmp(dot, at, length)) return true;
+        at += length;
+    }
+    return false;
+}
+
+/* Names in a folder that do not begin with a dot: the files with one of these endings, or without any the sub-folders. */
 typedef struct wanted {
-    npg_paths *out;
-    const char *folder;
-    bool folders;
+    npg_listing *out;
+    const char *folder, *endings;
 } wanted;
 
 static npg_status add_wanted(void *user, const char *name)
 {
     const wanted *w = user;
-    if (name[0] == '.' || !(w->folders || npg_format_by_ending(name))) return NPG_OK;
+    if (name[0] == '.' || (w->endings && !ends_in(name, w->endings))) return NPG_OK;
     char *path = npg_arena_path(w->out->arena, w->folder, name);
     NPG_TRY(npg_arena_status(w->out->arena));
-    return is_folder(path) == w->folders ? add_path(w->out, path) : NPG_OK;
+    return npg_is_folder(path) == !w->endings ? add_path(w->out, path) : NPG_OK;
 }
 
-static npg_status list_folder(npg_paths *out, const char *folder, bool wants_folders)
+static npg_status list_folder(npg_listing *out, const char *folder, const char *endings)
 {
-    wanted w = {out, folder, wants_folders};
-    npg_status status = npg_folder_each(folder, NPG_BAD_INPUT, add_wanted, &w);
-    sort_paths(out);
+    size_t before = out->count;
+    npg_status status = npg_folder_each(folder, NPG_BAD_INPUT, add_wanted, &(wanted){out, folder, endings});
+    sort_paths(out, before);
     return status;
 }
 
-static const char *ending_of(const char *path)
-{
-    return strrchr(path, '.');
-}
-
-typedef struct ending_count {
-    const char *ending; /* into a path */
-    size_t count;
-} ending_count;
-
-enum { ENDINGS_MAX = 32 }; /* more than readers know, upper and lower case being one */
-
-static size_t count_endings(ending_count counts[ENDINGS_MAX], const npg_paths *list)
-{
-    size_t known = 0;
-    for (size_t i = 0; i < list->count; i++) {
-        size_t k = 0;
-        while (k < known && strcasecmp(counts[k].ending, ending_of(list->paths[i])) != 0) k++;
-        if (k == ENDINGS_MAX) continue;
-        if (k == known) counts[known++] = (ending_count){ending_of(list->paths[i]), 0};
-        counts[k].count++;
-    }
-    return known;
-}
-
-static int by_count(const void *left, const void *right)
-{
-    const ending_count *a = left, *b = right;
-    return a->count > b->count ? -1 : a->count < b->count;
-}
-
 /* Frames of one capture have one ending; the others are counted, not taken. */
-static npg_status keep_one_ending(npg_paths *list, const char *folder)
+static npg_status keep_one_ending(npg_listing *list, const char *folder)
 {
-    ending_count counts[ENDINGS_MAX];
-    size_t known = count_endings(counts, list), kept = 0;
-    char ending[16];
-    if (!known) return NPG_OK;
-    qsort(counts, known, sizeof *counts, by_count);
-    if (known > 1 && counts[0].count == counts[1].count)
-        return npg_error(
-            NPG_BAD_INPUT, "%s: holds %zu files *%s and as many *%s; say which with a pattern such as %s/*%s",
-            folder, counts[0].count, counts[0].ending, counts[1].ending, folder, counts[0].ending);
-    snprintf(ending, sizeof ending, "%s", counts[0].ending);
+    size_t kept = 0, most, next;
+    const char *ending = npg_ending_of_most(&most, list->paths, list->count, sizeof *list->paths, NULL);
+    const char *other = npg_ending_of_most(&next, list->paths, list->count, sizeof *list->paths, ending);
+    if (most && most == next)
+        return npg_error(NPG_BAD_INPUT,
+                         "%s: holds %zu files *%s and as many *%s; say which with a pattern such as %s/*%s",
+                         folder, most, ending, other, folder, ending);
     for (size_t i = 0; i < list->count; i++)
-        if (!strcasecmp(ending_of(list->paths[i]), ending)) list->paths[kept++] = list->paths[i];
+        if (ends_in(list->paths[i], ending)) list->paths[kept++] = list->paths[i];
     list->left_out += list->count - kept;
     list->count = kept;
+    return NPG_OK;
+}
+
+npg_status npg_subfolder(npg_arena *arena, const char **out, const char *folder, const char *names)
+{
+    for (const char *at = names; *at; at += strspn(at, " ")) {
+        char name[64];
+        size_t length = strcspn(at, " ");
+        snprintf(name, sizeof name, "%.*s", (int)length, at);
+        *out = npg_arena_path(arena, folder, name);
+        NPG_TRY(npg_arena_status(arena));
+        if (npg_is_folder(*out)) return NPG_OK;
+        at += length;
+    }
+    *out = folder;
     return NPG_OK;
 }
 
@@ -108,43 +94,39 @@ static npg_status keep_one_ending(npg_paths *list, const char *folder)
  * point_clouds/ (the paper's data), or in an only sub-folder. */
 static npg_status find_sub_folder(npg_arena *arena, const char **out, const char *folder)
 {
-    static const char *const usual[] = {"points", "point_clouds"};
-    npg_paths folders = {.arena = arena};
-    for (size_t u = 0; u < 2; u++) {
-        *out = npg_arena_path(arena, folder, usual[u]);
-        NPG_TRY(npg_arena_status(arena));
-        if (is_folder(*out)) return NPG_OK;
-    }
-    NPG_TRY(list_folder(&folders, folder, true));
-    *out = folders.count == 1 ? folders.paths[0] : NULL;
+    npg_listing folders = {.arena = arena};
+    NPG_TRY(npg_subfolder(arena, out, folder, "points point_clouds"));
+    if (*out != folder) return NPG_OK;
+    NPG_TRY(list_folder(&folders, folder, NULL));
+    if (folders.count == 1) *out = folders.paths[0];
     return NPG_OK;
 }
 
-static npg_status find_in_folder(npg_paths *out, const char *folder)
+static npg_status find_in_folder(npg_listing *out, const char *folder)
 {
-    const char *inner = NULL;
-    NPG_TRY(list_folder(out, folder, false));
-    if (!out->count) NPG_TRY(find_sub_folder(out->arena, &inner, folder));
-    if (inner) NPG_TRY(list_folder(out, inner, false));
-    NPG_TRY(keep_one_ending(out, inner ? inner : folder));
+    const char *from = folder;
+    NPG_TRY(list_folder(out, folder, NPG_CLOUDS));
+    if (!out->count) NPG_TRY(find_sub_folder(out->arena, &from, folder));
+    if (from != folder) NPG_TRY(list_folder(out, from, NPG_CLOUDS));
+    NPG_TRY(keep_one_ending(out, from));
     if (out->count) return NPG_OK;
     return npg_error(NPG_BAD_INPUT, "%s: no file here has a format that can be read (" FORMATS_TEXT ")",
-                     inner ? inner : folder);
+                     from);
 }
 
 /* ---- a glob ---- */
 
-static npg_status find_by_glob(npg_paths *out, const char *pattern)
+static npg_status find_by_glob(npg_listing *out, const char *pattern)
 {
     glob_t found = {0};
     npg_status status = NPG_OK;
     int result = glob(pattern, GLOB_NOSORT, NULL, &found);
     if (result == GLOB_NOSPACE) status = npg_error(NPG_MEMORY, "%s: no memory for the names", pattern);
     for (size_t i = 0; i < found.gl_pathc && !status && !result; i++)
-        if (!is_folder(found.gl_pathv[i]))
+        if (!npg_is_folder(found.gl_pathv[i]))
             status = add_path(out, npg_arena_text(out->arena, found.gl_pathv[i]));
     globfree(&found);
-    sort_paths(out);
+    sort_paths(out, 0);
     return status;
 }
 
@@ -218,7 +200,7 @@ static int64_t number_under(const pattern *p, const char *path)
     return strtoll(digits, NULL, 10);
 }
 
-static npg_status keep_fitting(npg_paths *list, const pattern *p)
+static npg_status keep_fitting(npg_listing *list, const pattern *p)
 {
     size_t kept = 0;
     list->numbers = npg_arena_take(list->arena, list->count + 1, sizeof *list->numbers);
@@ -233,7 +215,7 @@ static npg_status keep_fitting(npg_paths *list, const pattern *p)
     return NPG_OK;
 }
 
-static npg_status find_by_pattern(npg_paths *out, const char *text)
+static npg_status find_by_pattern(npg_listing *out, const char *text)
 {
     pattern p = {0};
     NPG_TRY(parse_pattern(out->arena, &p, text));
@@ -274,7 +256,7 @@ static npg_status next_entry(npg_arena *arena, char **out, npg_source *source)
     return npg_arena_status(arena);
 }
 
-static npg_status read_list(npg_paths *out, npg_source *source)
+static npg_status read_list(npg_listing *out, npg_source *source)
 {
     for (;;) {
         char *line;
@@ -304,7 +286,7 @@ static npg_status is_list(npg_arena *arena, bool *out, const char *path)
     return status == NPG_MEMORY ? status : npg_arena_status(arena); /* what is no text is no list */
 }
 
-static npg_status find_in_list(npg_paths *out, const char *path)
+static npg_status find_in_list(npg_listing *out, const char *path)
 {
     npg_source *source;
     NPG_TRY(npg_source_open_file(&source, path));
@@ -317,7 +299,7 @@ static npg_status find_in_list(npg_paths *out, const char *path)
 
 /* ---- any of them ---- */
 
-static npg_status find_file(npg_paths *out, const char *path)
+static npg_status find_file(npg_listing *out, const char *path)
 {
     struct stat info;
     bool list;
@@ -328,7 +310,7 @@ static npg_status find_file(npg_paths *out, const char *path)
     return list ? find_in_list(out, path) : add_path(out, npg_arena_text(out->arena, path));
 }
 
-static npg_status find_matches(npg_paths *out, const char *input)
+static npg_status find_matches(npg_listing *out, const char *input)
 {
     size_t length;
     int width;
@@ -342,9 +324,50 @@ static npg_status find_matches(npg_paths *out, const char *input)
     return NPG_OK;
 }
 
-npg_status npg_paths_find(npg_paths *out, const char *input)
+npg_status npg_paths_find(npg_listing *out, const char *input)
 {
-    return is_folder(input)      ? find_in_folder(out, input)
+    return npg_is_folder(input)  ? find_in_folder(out, input)
            : npg_is_there(input) ? find_file(out, input)
                                  : find_matches(out, input);
+}
+
+/* ---- listings ---- */
+
+/* The frames of a rig, each as "rig.json#NUMBER" (npg_read_shape()). */
+static npg_status add_rig(npg_listing *listing, const char *path)
+{
+    npg_rig *rig;
+    NPG_TRY(npg_rig_open(&rig, path, &npg_rig_usual));
+    npg_status status = NPG_OK;
+    for (size_t f = 0; f < rig->frame_count && !status; f++) {
+        char *name = npg_arena_take(listing->arena, strlen(path) + 24, 1);
+        if (name) sprintf(name, "%s#%lld", path, (long long)rig->numbers[f]);
+        status = name ? add_path(listing, name) : npg_arena_status(listing->arena);
+    }
+    npg_rig_close(&rig);
+    return status;
+}
+
+npg_status npg_listing_add(npg_listing *listing, const char *path, const char *endings)
+{
+    size_t before = listing->count;
+    if (!npg_rig_is_frame(path) && !npg_is_there(path))
+        return npg_error_errno(NPG_BAD_INPUT, "can't read %s", path);
+    if (npg_is_folder(path)) {
+        NPG_TRY(list_folder(listing, path, endings));
+        return listing->count > before
+                   ? NPG_OK
+                   : npg_error(NPG_BAD_INPUT, "%s: the folder has no file that ends in %s", path, endings);
+    }
+    if (npg_rig_is(path)) return add_rig(listing, path);
+    return add_path(listing, npg_arena_text(listing->arena, path));
+}
+
+void npg_listing_keep(npg_listing *listing, const npg_selection *selection)
+{
+    size_t kept = 0;
+    int64_t count = (int64_t)listing->count;
+    for (int64_t i = 0; i < count; i++)
+        if (npg_selection_takes(selection, i, i, count)) listing->paths[kept++] = listing->paths[i];
+    listing->count = kept;
 }

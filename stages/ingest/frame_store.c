@@ -5,20 +5,21 @@
 
 #include "ingest/ingest_internal.h"
 
-#define ROW         (3 * sizeof(float))
-#define FREE_SHARE  4      /* of the disk's free space, one such part may be taken: results need room, too */
-#define RECORD_MADE "made" /* normals that were made or mended, of a frame */
+#define FREE_SHARE 4 /* of the disk's free space, one such part may be taken: results need room, too */
+
+/* What is kept of a frame: itself, and normals that were made or mended. */
+enum { WHOLE, MADE, PARTS };
+
+static const char *const records[PARTS] = {NPG_RECORD_FRAME, "made"};
 
 typedef struct entry {
     npg_frame *frame; /* its arrays are NULL where they are on disk; NULL: nothing is kept; owned */
-    float *made;      /* normals made or mended, N x 3, where they are not on disk; owned         */
-    npg_cleaning made_cleaning;
-    bool is_on_disk, has_made;
+    bool is_on_disk;
 } entry;
 
 struct npg_frame_store {
     pthread_mutex_t lock;
-    entry *entries; /* owned */
+    entry (*entries)[PARTS]; /* owned */
     size_t count, capacity, bytes, byte_max;
     char *folder;    /* owned; NULL: nothing goes to disk (any more) */
     npg_store *disk; /* owned; NULL: not made yet */
@@ -56,18 +57,11 @@ static size_t array_bytes(const npg_frame *frame)
     return bytes;
 }
 
-static size_t bytes_of(const entry *e)
-{
-    if (!e->frame) return 0;
-    return sizeof *e->frame + array_bytes(e->frame) + (e->made ? e->frame->point_count * ROW : 0);
-}
-
 static void drop(npg_frame_store *s, entry *e)
 {
-    s->bytes -= bytes_of(e);
+    if (e->frame) s->bytes -= sizeof *e->frame + array_bytes(e->frame);
     if (e->frame) npg_frame_clear(e->frame);
     npg_release(&e->frame);
-    npg_release(&e->made);
     *e = (entry){0};
 }
 
@@ -75,7 +69,7 @@ void npg_frame_store_close(npg_frame_store **slot)
 {
     npg_frame_store *s = *slot;
     if (!s) return;
-    for (size_t i = 0; i < s->count; i++) drop(s, &s->entries[i]);
+    for (size_t i = 0; i < PARTS * s->count; i++) drop(s, &s->entries[i / PARTS][i % PARTS]);
     npg_store_close(&s->disk);
     npg_release(&s->entries);
     npg_release(&s->folder);
@@ -91,11 +85,6 @@ npg_frame_store_use npg_frame_store_used(npg_frame_store *s)
     return use;
 }
 
-static entry *find(npg_frame_store *s, int64_t index)
-{
-    return index >= 0 && (size_t)index < s->count ? &s->entries[index] : NULL;
-}
-
 /* ---- disk ---- */
 
 static bool may_write(npg_frame_store *s, size_t size)
@@ -109,12 +98,13 @@ static bool may_write(npg_frame_store *s, size_t size)
 }
 
 /* False: it found no place; after a failure nothing more goes to disk. */
-static bool write_arrays(npg_frame_store *s, const char *kind, const npg_frame *frame, size_t bytes,
-                         const npg_store_array *arrays, size_t count)
+static bool write_frame(npg_frame_store *s, int part, const npg_frame *frame, size_t bytes)
 {
+    npg_store_array arrays[NPG_FRAME_ARRAYS];
     if (!may_write(s, bytes)) return false;
-    npg_store_begin(s->disk, kind, frame->index, 0);
-    npg_status status = npg_store_put_arrays(s->disk, frame, arrays, count);
+    npg_frame_arrays(arrays, frame);
+    npg_store_begin(s->disk, records[part], frame->index, 0);
+    npg_status status = npg_store_put_arrays(s->disk, frame, arrays, NPG_FRAME_ARRAYS);
     if (npg_store_end(s->disk, status, false)) {
         npg_release(&s->folder);
         return false;
@@ -123,131 +113,101 @@ static bool write_arrays(npg_frame_store *s, const char *kind, const npg_frame *
     return true;
 }
 
-static npg_status read_arrays(const npg_frame_store *s, const char *kind, int64_t index, npg_frame *frame,
-                              const npg_store_array *arrays, size_t count)
+static npg_status read_frame(const npg_frame_store *s, int part, npg_frame *frame, const npg_frame *kept)
 {
+    npg_store_array arrays[NPG_FRAME_ARRAYS];
     npg_record *record;
-    NPG_TRY(npg_store_read(s->disk, &record, kind, index, 0));
-    npg_status status = npg_record_get_arrays(record, frame, arrays, count, NPG_FOR_FRAMES);
+    npg_frame_arrays(arrays, kept);
+    NPG_TRY(npg_frame_copy(frame, kept));
+    npg_status status = npg_store_read(s->disk, &record, records[part], kept->index, 0);
+    if (!status) status = npg_record_get_arrays(record, frame, arrays, NPG_FRAME_ARRAYS, NPG_FOR_FRAMES);
     npg_record_close(&record);
+    if (status) npg_frame_clear(frame);
     return status;
 }
 
 /* ---- frames ---- */
 
-static bool fits(const npg_frame_store *s, size_t bytes)
+static void put_frame(npg_frame_store *s, entry *e, int part, const npg_frame *frame, bool is_final)
 {
-    return s->bytes <= s->byte_max && bytes <= s->byte_max - s->bytes;
-}
-
-static void put_frame(npg_frame_store *s, entry *e, const npg_frame *frame, bool is_final)
-{
-    npg_store_array arrays[NPG_FRAME_ARRAYS];
     npg_frame kept = *frame;
-    size_t bytes = array_bytes(frame);
-    npg_frame_arrays(arrays, frame);
-    e->is_on_disk = !fits(s, sizeof *frame + bytes);
+    size_t bytes = array_bytes(frame), most = s->byte_max > s->bytes ? s->byte_max - s->bytes : 0;
+    e->is_on_disk = sizeof *frame + bytes > most;
     if (e->is_on_disk) {
-        if (!is_final || !write_arrays(s, NPG_RECORD_FRAME, frame, bytes, arrays, NPG_FRAME_ARRAYS)) return;
+        if (!is_final || !write_frame(s, part, frame, bytes)) return;
         kept = npg_frame_bare(frame);
         kept.path = frame->path; /* stays in memory */
     }
     if (npg_alloc(&e->frame, NPG_FOR_FRAMES, sizeof *e->frame)) return;
     if (npg_frame_copy(e->frame, &kept)) npg_release(&e->frame);
-    s->bytes += bytes_of(e);
+    if (e->frame) s->bytes += sizeof *e->frame + array_bytes(e->frame);
+}
+
+static npg_status put(npg_frame_store *s, int part, const npg_frame *frame, bool is_final)
+{
+    pthread_mutex_lock(&s->lock);
+    size_t need = (size_t)frame->index + 1;
+    npg_status status = npg_grow(&s->entries, &s->capacity, need, sizeof *s->entries, NPG_FOR_FILES);
+    if (!status) {
+        entry *e = &s->entries[frame->index][part];
+        if (s->count < need) s->count = need;
+        drop(s, e);
+        put_frame(s, e, part, frame, is_final);
+    }
+    pthread_mutex_unlock(&s->lock);
+    return status;
+}
+
+static npg_status get(npg_frame_store *s, int part, npg_frame *frame, int64_t index, bool give_away)
+{
+    npg_status status = NPG_END;
+    pthread_mutex_lock(&s->lock);
+    entry *e = index >= 0 && (size_t)index < s->count ? &s->entries[index][part] : NULL;
+    if (e && e->frame && e->is_on_disk) {
+        status = read_frame(s, part, frame, e->frame);
+    } else if (e && e->frame && give_away) {
+        s->bytes -= sizeof *frame + array_bytes(e->frame);
+        *frame = *e->frame;
+        npg_release(&e->frame);
+        status = NPG_OK;
+    } else if (e && e->frame) {
+        status = npg_frame_copy(frame, e->frame);
+    }
+    pthread_mutex_unlock(&s->lock);
+    return status;
 }
 
 npg_status npg_frame_store_put(npg_frame_store *s, const npg_frame *frame, bool is_final)
 {
-    if (!frame->point_count || frame->is_held) return NPG_OK;
-    pthread_mutex_lock(&s->lock);
-    size_t need = (size_t)frame->index + 1;
-    npg_status status = npg_grow(&s->entries, &s->capacity, need, sizeof *s->entries, NPG_FOR_FILES);
-    if (!status && s->count < need) s->count = need;
-    entry *e = status ? NULL : find(s, frame->index);
-    if (e) drop(s, e);
-    if (e) put_frame(s, e, frame, is_final);
-    pthread_mutex_unlock(&s->lock);
-    return status;
-}
-
-static npg_status get_from_disk(const npg_frame_store *s, npg_frame *frame, const entry *e)
-{
-    npg_store_array arrays[NPG_FRAME_ARRAYS];
-    npg_frame_arrays(arrays, e->frame);
-    NPG_TRY(npg_frame_copy(frame, e->frame));
-    npg_status status = read_arrays(s, NPG_RECORD_FRAME, e->frame->index, frame, arrays, NPG_FRAME_ARRAYS);
-    if (status) npg_frame_clear(frame);
-    return status;
-}
-
-static void give_frame_away(npg_frame_store *s, npg_frame *frame, entry *e)
-{
-    size_t before = bytes_of(e);
-    *frame = *e->frame;
-    *e->frame = (npg_frame){.point_count = frame->point_count}; /* its made normals may still be asked for */
-    s->bytes -= before - bytes_of(e);
+    return frame->point_count && !frame->is_held ? put(s, WHOLE, frame, is_final) : NPG_OK;
 }
 
 npg_status npg_frame_store_get(npg_frame_store *s, npg_frame *frame, int64_t index, bool give_away)
 {
-    npg_status status = NPG_OK;
-    pthread_mutex_lock(&s->lock);
-    entry *e = find(s, index);
-    if (!e || !e->frame || (!e->is_on_disk && !e->frame->pos_local)) /* or was given away */
-        status = NPG_END;
-    else if (e->is_on_disk)
-        status = get_from_disk(s, frame, e);
-    else if (give_away)
-        give_frame_away(s, frame, e);
-    else
-        status = npg_frame_copy(frame, e->frame);
-    pthread_mutex_unlock(&s->lock);
-    return status;
+    return get(s, WHOLE, frame, index, give_away);
 }
 
 /* ---- normals ---- */
 
-static npg_store_array made_array(size_t point_count)
-{
-    return (npg_store_array){"normals", offsetof(npg_frame, normals), point_count, ROW};
-}
-
 void npg_frame_store_put_normals(npg_frame_store *s, const npg_frame *frame)
 {
-    size_t size = frame->point_count * ROW;
-    const npg_store_array array = made_array(frame->point_count);
-    pthread_mutex_lock(&s->lock);
-    entry *e = find(s, frame->index);
-    if (e && e->frame && e->frame->point_count == frame->point_count && !e->has_made) {
-        if (fits(s, size) && !npg_alloc(&e->made, NPG_FOR_FRAMES, size)) {
-            memcpy(e->made, frame->normals, size);
-            s->bytes += size;
-        }
-        e->made_cleaning = frame->cleaning;
-        e->has_made = e->made || write_arrays(s, RECORD_MADE, frame, size, &array, 1);
-    }
-    pthread_mutex_unlock(&s->lock);
+    npg_frame made = {.index = frame->index, .point_count = frame->point_count};
+    made.normals = frame->normals;
+    made.cleaning = frame->cleaning;
+    if (frame->point_count && !frame->is_held)
+        (void)put(s, MADE, &made, true); /* without room they are made again */
 }
 
 bool npg_frame_store_get_normals(npg_frame_store *s, npg_frame *frame)
 {
-    size_t size = frame->point_count * ROW;
-    const npg_store_array array = made_array(frame->point_count);
     npg_frame made = {0};
-    pthread_mutex_lock(&s->lock);
-    const entry *e = find(s, frame->index);
-    bool is_there = e && e->has_made && e->frame->point_count == frame->point_count;
-    if (is_there && !e->made) is_there = !read_arrays(s, RECORD_MADE, frame->index, &made, &array, 1);
-    if (is_there && e->made && !npg_alloc(&made.normals, NPG_FOR_FRAMES, size))
-        memcpy(made.normals, e->made, size);
-    if (made.normals && is_there) frame->cleaning = e->made_cleaning;
-    pthread_mutex_unlock(&s->lock);
-    if (!made.normals || !is_there) {
-        npg_release(&made.normals);
-        return false;
+    bool is_there = !get(s, MADE, &made, frame->index, false) && made.point_count == frame->point_count;
+    if (is_there) {
+        npg_release(&frame->normals);
+        frame->normals = made.normals;
+        frame->cleaning = made.cleaning;
+        made.normals = NULL;
     }
-    npg_release(&frame->normals);
-    frame->normals = made.normals;
-    return true;
+    npg_frame_clear(&made);
+    return is_there;
 }

@@ -132,10 +132,9 @@ static void report_sensor(npg_worker *worker, const npg_rig *rig, const npg_rig_
 /* Option align-sensors. */
 static npg_status align_sensors(npg_worker *worker, const npg_frame_files *list)
 {
-    npg_rig_view *views;
+    npg_rig_view *views = NULL;
     npg_rig *rig = list->rig;
-    NPG_TRY(npg_alloc_array(&views, NPG_FOR_FILES, rig->sensor_count, sizeof *views));
-    npg_status status = npg_frame_files_compare(list, views);
+    npg_status status = npg_frame_files_compare(list, &views);
     if (!status) npg_rig_correct(rig, views);
     for (size_t i = 0; i < rig->sensor_count && !status; i++) report_sensor(worker, rig, &views[i], i);
     npg_release(&views);

@@ -286,8 +286,8 @@ npg_status npg_frame_files_open(npg_frame_files **list, const char *input, const
 npg_status npg_frame_files_read(const npg_frame_files *list, size_t slot, npg_frame *frame,
                                 npg_origin *origin);
 
-/* npg_rig_compare() over the slots that have a path, of a list that has a rig. */
-npg_status npg_frame_files_compare(const npg_frame_files *list, npg_rig_view *views);
+/* npg_rig_compare() over the slots that have a path, of a list that has a rig; *views to npg_release(). */
+npg_status npg_frame_files_compare(const npg_frame_files *list, npg_rig_view **views);
 
 /* Call visit for each file that the frame `slot` is made of; ends with the first status but NPG_OK. */
 npg_status npg_frame_files_each(const npg_frame_files *list, size_t slot,
@@ -335,27 +335,29 @@ int npg_natural_order(const void *left, const void *right);
  * npg_frame_files_confine().  selection: in place of option frames, with its own gaps; NULL: as that says. */
 npg_status npg_capture_list(npg_frame_files **list, const npg_options *options, const char *selection);
 
-/* Listing: files of a folder in natural order. */
+/* Listing: files in natural order. */
 
 #define NPG_CLOUDS ".ply .obj .xyz .xyzn .txt .pts .npy .pcd" /* endings of all that is read */
 
 typedef struct npg_listing {
-    npg_arena arena; /* of the paths */
-    char **paths;    /* count of them */
+    npg_arena *arena; /* a loan, set before anything else: what paths and numbers are of */
+    char **paths;
+    int64_t *numbers; /* NULL unless the input itself says the numbers (a pattern) */
     size_t count, room;
+    size_t left_out; /* files of a folder with another ending */
+    bool is_listed;  /* in the order of a list, not sorted    */
 } npg_listing;
 
-/* Add a file, or the files of a folder whose names end in one of `endings` (".ply .obj"), numbers in names
- * compared as numbers.  NPG_BAD_INPUT when the path does not exist or the folder has no such file. */
+/* Add a file, the files of a folder whose names end in one of `endings` (".ply .obj"), numbers in names
+ * compared as numbers, or the frames of a rig.  NPG_BAD_INPUT when the path does not exist or the folder has no
+ * such file. */
 npg_status npg_listing_add(npg_listing *listing, const char *path, const char *endings);
-void npg_listing_close(npg_listing *listing);
 
 /* Keep the entries at the selected positions; a number in the selection is a position too, counted from 0. */
 void npg_listing_keep(npg_listing *listing, const npg_selection *selection);
 
-/* Where `folder` has a sub-folder of one of `names` ("truth gt"), that one's path, else the folder's own;
- * to be given to npg_release(). */
-npg_status npg_subfolder(char **out, const char *folder, const char *names);
+/* Where `folder` has a sub-folder of one of `names` ("truth gt"), that one's path, else `folder` itself. */
+npg_status npg_subfolder(npg_arena *arena, const char **out, const char *folder, const char *names);
 
 /* Frame store: frames kept for the passes that bring them again, in memory up to a limit and beyond it in a
  * file without a name, which is gone with the run whatever ends it.

@@ -65,6 +65,10 @@ npg_format_read npg_ply_read, npg_npy_read;
 /* .xyzn: columns 4 to 6 are normals whatever their length. */
 npg_format_read npg_obj_read, npg_pcd_read, npg_xyz_read, npg_xyzn_read;
 
+/* The ending that most of the names have, of those that readers know but `but` (or NULL); how many have it.  Names are
+ * texts, or stand first in structs of `size` bytes. */
+const char *npg_ending_of_most(size_t *most, const void *names, size_t count, size_t size, const char *but);
+
 /* The format a name's ending stands for ("ply", "xyz", ...), NULL for none; the file is not read. */
 const char *npg_format_by_ending(const char *path);
 
@@ -139,17 +143,8 @@ int64_t npg_common_divisor(int64_t a, int64_t b);
 
 /* Frame inputs: the files that a folder, pattern, glob, list or single path stands for. */
 
-typedef struct npg_paths {
-    npg_arena *arena; /* a loan, set before anything else: what paths and numbers are of */
-    char **paths;
-    int64_t *numbers; /* NULL unless the input itself says the numbers (a pattern) */
-    size_t count, capacity;
-    size_t left_out; /* see npg_frame_files                     */
-    bool is_listed;  /* in the order of a list file, not sorted */
-} npg_paths;
-
 /* In time order, at least one.  See npg_frame_files_open. */
-npg_status npg_paths_find(npg_paths *out, const char *input);
+npg_status npg_paths_find(npg_listing *out, const char *input);
 
 /* Capture: the frames of a capture in files, readable in any order, with a store of what was read. */
 

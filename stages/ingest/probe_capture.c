@@ -48,17 +48,10 @@ static npg_status read_stream(job *j)
 #define APART_MOST    0.004 /* of the depth, between what two sensors see: 1 cm at 2.5 m, more than noise */
 #define OVERLAP_LEAST 0.02
 
-/* Sensors against each other; with option align-sensors what they are then read with. */
-static npg_status compare_sensors(job *j, npg_rig_view **views)
-{
-    NPG_TRY(npg_alloc_array(views, NPG_FOR_FILES, j->list->rig->sensor_count, sizeof **views));
-    return npg_frame_files_compare(j->list, *views);
-}
-
 static npg_status align_sensors(job *j)
 {
     if (!j->list->rig || !option_on(j->options, "align-sensors")) return NPG_OK;
-    NPG_TRY(compare_sensors(j, &j->before));
+    NPG_TRY(npg_frame_files_compare(j->list, &j->before));
     npg_rig_correct(j->list->rig, j->before);
     return NPG_OK;
 }
@@ -96,7 +89,7 @@ static npg_status read_files(job *j)
     double begin_s = npg_clock_s();
     npg_status status = npg_probe_files(&j->probe, j->list);
     j->probe.read_s = npg_clock_s() - begin_s;
-    if (!status && j->list->rig) status = compare_sensors(j, &j->views);
+    if (!status && j->list->rig) status = npg_frame_files_compare(j->list, &j->views);
     if (!status && j->list->rig) warn_of_sensors(j);
     return status;
 }

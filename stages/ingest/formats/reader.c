@@ -67,6 +67,22 @@ static npg_status find_format(const struct format **out, npg_source *source)
                      source->name);
 }
 
+const char *npg_ending_of_most(size_t *most, const void *names, size_t count, size_t size, const char *but)
+{
+    const char *ending = "";
+    *most = 0;
+    for (size_t f = 0; f < FORMATS; f++) {
+        size_t same = 0;
+        for (size_t i = 0; i < count && formats[f].ending != but; i++) {
+            const char *name = *(char *const *)(const void *)((const char *)names + i * size);
+            same += !strcasecmp(strrchr(name, '.'), formats[f].ending);
+        }
+        if (same > *most) ending = formats[f].ending;
+        if (same > *most) *most = same;
+    }
+    return ending;
+}
+
 const char *npg_format_by_ending(const char *path)
 {
     const struct format *format = by_ending(path);

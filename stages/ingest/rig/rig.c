@@ -45,15 +45,9 @@ static const char *foreign_layout(const char *folder)
                                                              : NULL;
 }
 
-static bool is_folder(const char *path)
-{
-    struct stat info;
-    return !stat(path, &info) && S_ISDIR(info.st_mode);
-}
-
 bool npg_rig_is(const char *path)
 {
-    if (!is_folder(path)) return npg_rig_ends_with(path, ".json");
+    if (!npg_is_folder(path)) return npg_rig_ends_with(path, ".json");
     return npg_is_in_folder(path, "rig.json") || foreign_layout(path);
 }
 
@@ -65,7 +59,7 @@ const npg_rig_settings npg_rig_usual = {.step_share = 0.02, .margin = 1};
 static char *find_folder(npg_rig *rig)
 {
     char *folder = npg_arena_text(&rig->arena, rig->path), *slash = folder ? strrchr(folder, '/') : NULL;
-    if (!folder || is_folder(folder)) return folder;
+    if (!folder || npg_is_folder(folder)) return folder;
     if (!slash) return npg_arena_text(&rig->arena, ".");
     slash[slash == folder] = 0;
     return folder;
@@ -74,7 +68,7 @@ static char *find_folder(npg_rig *rig)
 static npg_status load(npg_rig *rig, const char *path)
 {
     const char *foreign =
-        is_folder(path) && !npg_is_in_folder(path, "rig.json") ? foreign_layout(path) : NULL;
+        npg_is_folder(path) && !npg_is_in_folder(path, "rig.json") ? foreign_layout(path) : NULL;
     if (foreign)
         return npg_error(NPG_BAD_INPUT,
                          "%s: depth images as %s has them, without a rig.json: rig_json.py writes one "

@@ -144,7 +144,7 @@ static npg_status get_camera(const place *p, const json_t *object, npg_camera *c
 
 /* Files of a numbered pattern, in order; the pattern starts from the rig's folder. */
 static npg_status find_numbered(npg_rig *rig, const place *p, const char *key, const char *pattern,
-                                npg_paths *paths)
+                                npg_listing *paths)
 {
     char *path;
     if (!pattern || (!strchr(pattern, '%') && !strchr(pattern, '#')))
@@ -160,7 +160,7 @@ static npg_status find_numbered(npg_rig *rig, const place *p, const char *key, c
 
 /* Files that are listed, numbered from 0. */
 static npg_status find_listed(npg_rig *rig, const place *p, const char *key, const json_t *list,
-                              npg_paths *paths)
+                              npg_listing *paths)
 {
     size_t count = json_array_size(list);
     paths->is_listed = true;
@@ -179,7 +179,7 @@ static npg_status find_listed(npg_rig *rig, const place *p, const char *key, con
     return NPG_OK;
 }
 
-static char *path_of_number(const npg_paths *paths, int64_t number)
+static char *path_of_number(const npg_listing *paths, int64_t number)
 {
     const int64_t *found =
         paths->count ? bsearch(&number, paths->numbers, paths->count, sizeof number, npg_order_int64) : NULL;
@@ -193,9 +193,9 @@ static const char *const image_keys[] = {"depth", "colour", "mask"};
 static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place *p,
                               const json_t *const images[3])
 {
-    npg_paths lists[3];
+    npg_listing lists[3];
     for (size_t k = 0; k < 3; k++) {
-        lists[k] = (npg_paths){.arena = &rig->arena};
+        lists[k] = (npg_listing){.arena = &rig->arena};
         if (images[k])
             NPG_TRY(json_is_array(images[k])
                         ? find_listed(rig, p, image_keys[k], images[k], &lists[k])
