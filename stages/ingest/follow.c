@@ -105,14 +105,22 @@ static void choose_ending(npg_follow *follow, const void *names, size_t count, s
     if (!follow->pattern) follow->ending = npg_ending_of_most(&most, names, count, size, NULL);
 }
 
-npg_status npg_follow_resume(npg_follow *follow, const npg_follow_place *place)
+/* The name of the file becomes the last one's. */
+static void note_taken(npg_follow *follow, char *name, int64_t number)
 {
-    NPG_TRY(npg_copy_text(&follow->last, place->last));
-    choose_ending(follow, &follow->last, 1, sizeof follow->last);
-    follow->number_place = place->digits;
-    follow->number = place->number;
-    follow->step = place->step;
-    follow->taken_count = place->taken_count;
+    if (follow->taken_count++) follow->step = npg_common_divisor(number - follow->number, follow->step);
+    follow->number = number;
+    npg_release(&follow->last);
+    follow->last = name;
+}
+
+npg_status npg_follow_pass(npg_follow *follow, const char *name, size_t digits, int64_t number)
+{
+    char *copy;
+    NPG_TRY(npg_copy_text(&copy, name));
+    choose_ending(follow, &copy, 1, sizeof copy);
+    follow->number_place = digits;
+    note_taken(follow, copy, number);
     return NPG_OK;
 }
 
@@ -307,11 +315,8 @@ static npg_status accept_head(npg_follow *follow, npg_frame *frame)
     if (follow->taken_count && number <= follow->number)
         return npg_error(NPG_BAD_INPUT, "%s/%s: has the number %lld, and the frame before it %lld",
                          follow->folder, head.name, (long long)number, (long long)follow->number);
-    if (follow->taken_count) follow->step = npg_common_divisor(number - follow->number, follow->step);
-    frame->number = follow->number = number;
-    follow->taken_count++;
-    npg_release(&follow->last);
-    follow->last = head.name;
+    frame->number = number;
+    note_taken(follow, head.name, number);
     follow->files[follow->begin++].name = NULL;
     return NPG_OK;
 }

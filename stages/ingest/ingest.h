@@ -431,8 +431,8 @@ npg_status npg_spool_add(npg_store *spool, npg_spooled *entry, const npg_frame *
 /* The i-th that came; *record, which may be NULL, to npg_record_close().  NPG_BAD_INPUT where it is damaged. */
 npg_status npg_spool_get(npg_store *spool, int64_t i, npg_spooled *entry, npg_record **record);
 
-/* The path that the frame had, NULL for none; a loan of the record. */
-const char *npg_spool_path(const npg_record *record);
+/* The frame's "path", or "cause" of being skipped, NULL for none; a loan of the record. */
+const char *npg_spool_text(const npg_record *record, const char *name);
 
 /* Number, index, marks, path and points of it into an empty frame. */
 npg_status npg_spool_frame(const npg_spooled *entry, const npg_record *record, npg_frame *frame);

@@ -211,17 +211,9 @@ typedef struct npg_follow npg_follow;
 npg_status npg_follow_open(npg_follow **follow, const npg_follow_settings *settings);
 void npg_follow_close(npg_follow **follow);
 
-/* Where an earlier run was: the next frame is one behind these in natural order. */
-typedef struct npg_follow_place {
-    const char *last; /* name of the file that was taken last                     */
-    size_t digits;    /* npg_follow_digits() of the run                           */
-    int64_t number;   /* of the last file, and by what the numbers grew until it  */
-    int64_t step;
-    size_t taken_count; /* files taken                                              */
-} npg_follow_place;
-
-/* Before the first frame.  NPG_MEMORY. */
-npg_status npg_follow_resume(npg_follow *follow, const npg_follow_place *place);
+/* A file that an earlier run has taken, in their order: the next frame is one behind it in natural order.  digits:
+ * npg_follow_digits() of that run.  NPG_MEMORY. */
+npg_status npg_follow_pass(npg_follow *follow, const char *name, size_t digits, int64_t number);
 
 /* Files that are there now and were not taken. */
 npg_status npg_follow_count_new(npg_follow *follow, size_t *count);

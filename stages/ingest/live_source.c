@@ -30,9 +30,10 @@ struct npg_live_source {
     uint64_t key;           /* of the last entry of the spool                                    */
     int64_t *entries;       /* in the spool, of each frame by index, where some are not selected */
     size_t entry_capacity;
-    int64_t again; /* of a resumed run: entries that were pushed again and compared          */
-    int64_t came;  /* entries of the spool that earlier runs had                             */
-    int64_t total; /* frames, where an earlier run has seen the end; else -1                 */
+    int64_t came;     /* entries of the spool that earlier runs had ...                      */
+    int64_t again;    /* ... that were walked again, and, as they came again by being ...    */
+    int64_t compared; /* ... pushed, compared                                                */
+    int64_t total;    /* frames, where an earlier run has seen the end; else -1              */
     bool is_ended;
     char cause[512]; /* why the frame that was skipped last was */
 };
@@ -148,8 +149,8 @@ static npg_status next_pushed(npg_live_source *live, npg_frame *frame)
     for (npg_spooled entry;; npg_frame_clear(frame)) {
         NPG_TRY(next_of_feed(live, frame));
         entry.number = INT64_MIN;
-        while (live->again < live->came && entry.number < frame->number)
-            NPG_TRY(npg_spool_get(live->spool, live->again++, &entry, NULL));
+        while (live->compared < live->came && entry.number < frame->number)
+            NPG_TRY(npg_spool_get(live->spool, live->compared++, &entry, NULL));
         if (entry.number < frame->number) return NPG_OK;
         if (entry.number > frame->number || entry.is_missing)
             return refuse(live, frame->number, "did not come before");
@@ -157,11 +158,72 @@ static npg_status next_pushed(npg_live_source *live, npg_frame *frame)
     }
 }
 
+/* ---- what earlier runs had comes again, from the spool ---- */
+
+static bool is_again(const npg_live_source *live)
+{
+    return live->seen < live->came;
+}
+
+/* Whether an earlier run had this frame in its state, and has said what there is to say of it. */
+static bool is_told(const npg_live_source *live, int64_t index)
+{
+    const npg_facts *facts = npg_worker_facts(live->worker);
+    return index < 0 || npg_plan_is_read(&facts->plan, index, facts->resumed_read, facts->frame_count);
+}
+
+/* A frame that was piped comes again. */
+static npg_status compare_streamed(npg_live_source *live, const npg_spooled *entry)
+{
+    npg_frame frame = {0};
+    npg_status status = next_streamed(live, &frame);
+    if (status == NPG_END) return refuse(live, entry->number, "does not come any more");
+    if (!status) status = check_content(live, entry, &frame);
+    npg_frame_clear(&frame);
+    return status;
+}
+
+/* The folder goes on behind the file of this entry. */
+static npg_status pass_file(npg_follow *follow, const npg_spooled *entry, const npg_record *record)
+{
+    const char *path = npg_spool_text(record, "path"), *slash = path ? strrchr(path, '/') : NULL;
+    return slash ? npg_follow_pass(follow, slash + 1, (size_t)entry->digits, entry->number) : NPG_OK;
+}
+
+static npg_status next_again(npg_live_source *live, npg_frame *frame)
+{
+    npg_record *record;
+    npg_spooled entry;
+    NPG_TRY(npg_spool_get(live->spool, live->again++, &entry, &record));
+    const char *cause = npg_spool_text(record, "cause");
+    npg_status status = live->stream   ? compare_streamed(live, &entry)
+                        : live->follow ? pass_file(live->follow, &entry, record)
+                                       : NPG_OK;
+    if (!status) status = npg_spool_frame(&entry, record, frame);
+    if (!status && cause && !is_told(live, entry.index))
+        npg_worker_warn(live->worker, true, entry.number, "skipped: %s", cause);
+    if (!status) live->skipped_count += entry.is_skipped;
+    npg_record_close(&record);
+    return status;
+}
+
+/* Gaps are counted anew: entries of missing frames are passed over. */
+static npg_status skip_missing(npg_live_source *live)
+{
+    npg_spooled entry = {.is_missing = true};
+    while (live->again < live->came && entry.is_missing) {
+        NPG_TRY(npg_spool_get(live->spool, live->again, &entry, NULL));
+        live->again += entry.is_missing;
+    }
+    return NPG_OK;
+}
+
 static npg_status next_frame(npg_live_source *live, npg_frame *frame)
 {
-    NPG_TRY(live->stream   ? next_streamed(live, frame)
-            : live->follow ? next_followed(live, frame)
-                           : next_pushed(live, frame));
+    NPG_TRY(live->again < live->came ? next_again(live, frame)
+            : live->stream           ? next_streamed(live, frame)
+            : live->follow           ? next_followed(live, frame)
+                                     : next_pushed(live, frame));
     frame->cleaning.read = frame->point_count;
     return NPG_OK;
 }
@@ -177,28 +239,34 @@ static npg_status note_place(npg_live_source *live, int64_t index, int64_t entry
     return NPG_OK;
 }
 
-/* The frame that came, or is missing, in the spool; then it is the last one, where it was selected. */
-static npg_status keep(npg_live_source *live, npg_frame *frame, bool is_missing, bool is_chosen)
+static npg_status spool(npg_live_source *live, const npg_frame *frame, bool is_missing)
 {
     npg_spooled entry = {.number = frame->number,
-                         .index = is_chosen ? live->next : -1,
+                         .index = frame->index,
                          .points = -1,
                          .key = live->key,
                          .is_missing = is_missing,
                          .is_held = frame->is_held,
                          .is_skipped = frame->is_skipped};
-    npg_status status = NPG_OK;
-    frame->index = entry.index;
     if (live->follow) entry.digits = (int64_t)npg_follow_digits(live->follow);
     if (!is_missing) entry.points = (int64_t)frame->point_count;
     if (!is_missing) entry.hash = npg_spool_hash(frame);
-    if (!status && (!live->own || live->next < live->settings.look_ahead)) {
-        if (is_chosen) status = note_place(live, live->next, npg_spool_count(live->spool));
-        bool with_points = is_chosen || holds(live);
-        const char *cause = frame->is_skipped && !is_missing ? live->cause : NULL;
-        if (!status) status = npg_spool_add(live->spool, &entry, frame, with_points, cause);
-    }
+    const char *cause = frame->is_skipped && !is_missing ? live->cause : NULL;
+    NPG_TRY(npg_spool_add(live->spool, &entry, frame, frame->index >= 0 || holds(live), cause));
     live->key = entry.key;
+    return NPG_OK;
+}
+
+/* The frame that came, or is missing, in the spool; then it is the last one, where it was selected. */
+static npg_status keep(npg_live_source *live, npg_frame *frame, bool is_missing, bool is_chosen)
+{
+    npg_status status = NPG_OK;
+    frame->index = is_chosen ? live->next : -1;
+    if (!live->own || live->next < live->settings.look_ahead) {
+        if (is_chosen) status = note_place(live, live->next, live->seen);
+        if (!status && !is_again(live)) status = spool(live, frame, is_missing);
+    }
+    live->seen++;
     npg_frame_clear(&live->last);
     if (!status && is_chosen) {
         live->last = *frame;
@@ -232,9 +300,10 @@ static npg_status check_step(npg_live_source *live, int64_t step, int64_t number
         return npg_error(NPG_BAD_INPUT,
                          "frame %lld: the numbers grew by %lld before and now by %lld: frames are missing",
                          (long long)number, (long long)live->step, (long long)step);
-    npg_worker_warn(live->worker, true, number,
-                    "the numbers grew by %lld before and now by %lld: frames before it are missing",
-                    (long long)live->step, (long long)step);
+    if (!is_again(live))
+        npg_worker_warn(live->worker, true, number,
+                        "the numbers grew by %lld before and now by %lld: frames before it are missing",
+                        (long long)live->step, (long long)step);
     return NPG_OK;
 }
 
@@ -264,24 +333,20 @@ static npg_status keep_previous(npg_live_source *live, const npg_frame *frame)
     return NPG_OK;
 }
 
-static void warn_of_missing(npg_live_source *live, int64_t number, bool is_held)
-{
-    npg_worker_warn(live->worker, !is_held, number, "the frame is missing and %s",
-                    is_held ? "repeats the frame before it" : "is skipped");
-}
-
 static npg_status fill_gap(npg_live_source *live)
 {
     npg_frame frame = {.fields = NPG_FIELD_POINTS};
     live->gap_left--;
     int64_t number = live->previous.number += live->step;
-    bool is_held = holds(live), is_chosen = npg_selection_takes(&live->selection, live->seen++, number, -1);
+    bool is_held = holds(live), is_chosen = npg_selection_takes(&live->selection, live->seen, number, -1);
     if (is_chosen && is_held) NPG_TRY(npg_frame_copy(&frame, &live->previous));
     frame.number = number;
     frame.is_key = false;
     frame.is_held = is_held;
     frame.is_skipped = !is_held || live->previous.is_skipped;
-    if (is_chosen) warn_of_missing(live, number, is_held);
+    if (is_chosen && !(is_again(live) && is_told(live, live->next)))
+        npg_worker_warn(live->worker, !is_held, number, "the frame is missing and %s",
+                        is_held ? "repeats the frame before it" : "is skipped");
     return keep(live, &frame, true, is_chosen);
 }
 
@@ -339,7 +404,7 @@ static npg_status end_live(npg_live_source *live)
 static npg_status take_waiting(npg_live_source *live)
 {
     npg_frame *frame = &live->waiting;
-    bool is_chosen = npg_selection_takes(&live->selection, live->seen++, frame->number, -1);
+    bool is_chosen = npg_selection_takes(&live->selection, live->seen, frame->number, -1);
     live->is_waiting = false;
     NPG_TRY(keep_previous(live, frame));
     return keep(live, frame, false, is_chosen);
@@ -350,7 +415,7 @@ static npg_status step(npg_live_source *live)
 {
     if (live->is_ended) return NPG_END;
     if (npg_worker_stopping(live->worker)) return npg_error(NPG_STOPPED, "stopped while reading");
-    if (live->total >= 0 && live->next >= live->total) return end_live(live);
+    if (live->total >= 0 && live->next >= live->total && !is_again(live)) return end_live(live);
     if (!live->is_waiting) {
         npg_status status = next_frame(live, &live->waiting);
         if (status) return status == NPG_END ? end_live(live) : status;
@@ -418,100 +483,22 @@ npg_status npg_live_source_end(npg_live_source *live)
     return status ? status : npg_error(NPG_FAILED, "a frame came behind the last one");
 }
 
-/* ---- a run that is resumed, or done ---- */
-
-/* The state may be older than what was said of the frame. */
-static void warn_again(npg_live_source *live, const npg_spooled *entry, const npg_record *record)
-{
-    size_t size;
-    const char *cause = npg_record_find(record, "cause", &size);
-    if (entry->is_missing && entry->index >= 0)
-        warn_of_missing(live, entry->number, entry->is_held);
-    else if (cause && size && !cause[size - 1])
-        npg_worker_warn(live->worker, true, entry->number, "skipped: %s", cause);
-}
-
-/* A frame that was piped comes again. */
-static npg_status compare_streamed(npg_live_source *live, const npg_spooled *entry)
-{
-    npg_frame frame = {0};
-    live->next = entry->index >= 0 ? entry->index + 1 : live->next;
-    npg_status status = next_streamed(live, &frame);
-    if (status == NPG_END) return refuse(live, entry->number, "does not come any more");
-    if (!status) status = check_content(live, entry, &frame);
-    npg_frame_clear(&frame);
-    return status;
-}
-
-/* What the frame was is so still; and where the source stands behind it. */
-static npg_status pass_over(npg_live_source *live, const npg_spooled *entry, const npg_record *record,
-                            npg_follow_place *place, bool is_needed)
-{
-    live->key = entry->key;
-    live->seen++;
-    live->skipped_count += entry->is_skipped && (entry->index >= 0 || !entry->is_missing);
-    if (is_needed) warn_again(live, entry, record);
-    if (entry->index >= 0) NPG_TRY(note_place(live, entry->index, live->seen - 1));
-    if (!entry->is_missing && live->stream) NPG_TRY(compare_streamed(live, entry));
-    if (entry->index >= 0) live->next = entry->index + 1;
-    live->previous.number = entry->number;
-    if (entry->is_missing) return NPG_OK;
-    if (place->taken_count++) place->step = npg_common_divisor(entry->number - place->number, place->step);
-    place->number = entry->number;
-    place->digits = (size_t)entry->digits;
-    live->again = live->seen - 1; /* for the moment: the last that came */
-    return NPG_OK;
-}
-
-/* As if all of it had come in this run: where the folder goes on, and what a gap would repeat. */
-static npg_status stand_behind(npg_live_source *live, npg_follow_place *place)
-{
-    npg_frame *previous = &live->previous;
-    int missing = live->settings.missing;
-    npg_record *record;
-    npg_spooled entry;
-    const int64_t number = previous->number;
-    NPG_TRY(npg_spool_get(live->spool, live->again, &entry, &record));
-    npg_status status = NPG_OK;
-    const char *path = npg_spool_path(record), *slash = path ? strrchr(path, '/') : NULL;
-    if (live->follow && slash) {
-        place->last = slash + 1;
-        status = npg_follow_resume(live->follow, place);
-    }
-    if (!status && holds(live) && !live->stream) status = npg_spool_frame(&entry, record, previous);
-    npg_record_close(&record);
-    previous->number = number;
-    previous->is_skipped = entry.is_skipped;
-    if (live->follow && missing != NPG_MISSING_IGNORE && place->taken_count > 1) live->step = place->step;
-    if (!live->follow && !live->stream && place->taken_count > 1 &&
-        (holds(live) || missing == NPG_MISSING_SKIP))
-        live->step = 1;
-    live->again = 0;
-    return status;
-}
-
-/* Through all that earlier runs had of the source. */
-static npg_status walk_again(npg_live_source *live, bool is_done)
-{
-    const npg_facts *facts = npg_worker_facts(live->worker);
-    npg_follow_place place = {0};
-    live->came = npg_spool_count(live->spool);
-    for (int64_t i = 0; i < live->came; i++) {
-        npg_record *record;
-        npg_spooled entry;
-        NPG_TRY(npg_spool_get(live->spool, i, &entry, &record));
-        bool is_needed =
-            !is_done && entry.index >= 0 &&
-            !npg_plan_is_read(&facts->plan, entry.index, facts->resumed_read, facts->frame_count);
-        bool is_repeated = !is_done && holds(live) && i == live->came - 1;
-        npg_status status = pass_over(live, &entry, record, &place, is_needed || is_repeated);
-        npg_record_close(&record);
-        NPG_TRY(status);
-    }
-    return live->came ? stand_behind(live, &place) : NPG_OK;
-}
-
 /* ---- the whole ---- */
+
+/* As if all that earlier runs had came in this one. */
+static npg_status walk_again(npg_live_source *live)
+{
+    npg_spooled last;
+    npg_status status = NPG_OK;
+    live->came = npg_spool_count(live->spool);
+    if (live->came) NPG_TRY(npg_spool_get(live->spool, live->came - 1, &last, NULL));
+    if (live->came) live->key = last.key;
+    while (!status && (live->is_waiting || live->again < live->came)) {
+        if (!live->is_waiting) status = skip_missing(live);
+        if (!status && (live->is_waiting || live->again < live->came)) status = step(live);
+    }
+    return status;
+}
 
 npg_status npg_live_source_open(npg_live_source **out, npg_worker *worker, const npg_live_settings *settings,
                                 size_t cache_bytes, const char *spill_folder)
@@ -531,7 +518,7 @@ npg_status npg_live_source_open(npg_live_source **out, npg_worker *worker, const
     }
     if (!status) status = npg_frame_store_open(&live->cache, cache_bytes, spill_folder);
     if (!status) status = open_source(live);
-    if (!status && facts->is_resumed) status = walk_again(live, false);
+    if (!status && facts->is_resumed) status = walk_again(live);
     if (!status) status = npg_worker_publish(worker, &npg_fact_frame_store, live->cache);
     if (status) npg_live_source_close(&live);
     *out = live;
@@ -562,11 +549,16 @@ npg_status npg_live_check_done(npg_worker *worker, npg_store *spool)
     if (!npg_worker_settings(worker)->follow[0]) return NPG_OK;
     NPG_TRY(npg_alloc(&live, NPG_FOR_FILES, sizeof *live));
     live->worker = worker;
-    live->spool = spool;
     live->settings = (npg_live_settings){
         .follow_end = npg_options_get(npg_worker_options(worker), "follow-end.name"), .follow_idle_s = 1};
     npg_status status = open_follow(live);
-    if (!status) status = walk_again(live, true);
+    for (int64_t i = 0; i < npg_spool_count(spool) && !status; i++) {
+        npg_record *record;
+        npg_spooled entry;
+        status = npg_spool_get(spool, i, &entry, &record);
+        if (!status && !entry.is_missing) status = pass_file(live->follow, &entry, record);
+        npg_record_close(&record);
+    }
     if (!status) status = npg_follow_count_new(live->follow, &fresh);
     npg_live_source_close(&live);
     if (status || !fresh) return status;

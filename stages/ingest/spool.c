@@ -55,16 +55,16 @@ npg_status npg_spool_get(npg_store *spool, int64_t i, npg_spooled *entry, npg_re
     return status;
 }
 
-const char *npg_spool_path(const npg_record *record)
+const char *npg_spool_text(const npg_record *record, const char *name)
 {
     size_t size;
-    const char *path = npg_record_find(record, "path", &size);
-    return path && size && !path[size - 1] ? path : NULL;
+    const char *text = npg_record_find(record, name, &size);
+    return text && size && !text[size - 1] ? text : NULL;
 }
 
 npg_status npg_spool_frame(const npg_spooled *entry, const npg_record *record, npg_frame *frame)
 {
-    const char *path = npg_spool_path(record);
+    const char *path = npg_spool_text(record, "path");
     npg_store_array arrays[NPG_FRAME_ARRAYS];
     size_t size = 0;
     if (npg_record_find(record, "points", &size)) frame->point_count = size / ROW;
