@@ -88,12 +88,11 @@ static npg_status draw(const npg_listing *files, const settings *s)
 int npg_verb_render(int argc, char **argv)
 {
     settings s;
-    npg_arena arena = {.purpose = NPG_FOR_FILES};
-    npg_listing files = {.arena = &arena};
+    npg_listing files = {.arena = &(npg_arena){.purpose = NPG_FOR_FILES}};
     npg_cli cli;
     npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
     if (!status) status = list_files(&files, &s, &cli);
     if (!status) status = draw(&files, &s);
-    npg_arena_release(&arena);
+    npg_arena_release(files.arena);
     return npg_cli_end(argv[0], status);
 }
