@@ -142,7 +142,14 @@ npg_status npg_frame_files_each(const npg_frame_files *list, size_t slot,
 {
     const npg_frame_slot *at = &list->slots[slot];
     if (!list->rig) return visit(user, at->path);
-    return npg_rig_each_image(list->rig, npg_rig_find(list->rig, at->number), visit, user);
+    for (size_t s = 0, frame = npg_rig_find(list->rig, at->number); s < list->rig->sensor_count; s++) {
+        const npg_rig_shot *shot = npg_rig_shot_of(list->rig, frame, s);
+        const char *const paths[] = {shot ? shot->depth : NULL, shot ? shot->colour : NULL,
+                                     shot ? shot->mask : NULL};
+        for (size_t i = 0; i < sizeof paths / sizeof *paths; i++)
+            if (paths[i]) NPG_TRY(visit(user, paths[i]));
+    }
+    return NPG_OK;
 }
 
 /* ---- checksums ---- */

@@ -1,5 +1,6 @@
 /* Frame selection: the text of --frames. */
 #include "ingest/ingest_internal.h"
+#include "pipeline/order.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -71,17 +72,11 @@ static npg_status parse_range(int64_t range[2], const char *text, const char **a
     return NPG_OK;
 }
 
-static int by_first(const void *left, const void *right)
-{
-    const int64_t *a = left, *b = right;
-    return a[0] < b[0] ? -1 : a[0] > b[0];
-}
-
 /* Sort, and join what overlaps. */
 static void merge_ranges(npg_selection *s)
 {
     size_t kept = 0;
-    qsort(s->ranges, s->range_count, sizeof *s->ranges, by_first);
+    qsort(s->ranges, s->range_count, sizeof *s->ranges, npg_order_int64);
     for (size_t i = 1; i < s->range_count; i++) {
         if (s->ranges[i][0] <= s->ranges[kept][1]) {
             if (s->ranges[i][1] > s->ranges[kept][1]) s->ranges[kept][1] = s->ranges[i][1];

@@ -40,15 +40,13 @@ npg_status npg_read_points(npg_mesh **mesh, const char *path, npg_origin *origin
 npg_status npg_read_shape(npg_mesh **mesh, const char *path, npg_origin *origin);
 
 /* Frames concatenated on a stream (a pipe will do): PLY or NPY files one after the other.  NPG_END at a clean
- * end between two frames; a stream that stops inside a frame is NPG_BAD_INPUT. */
+ * end between two frames; a stream that stops inside a frame is NPG_BAD_INPUT.  stopping(user), or
+ * NULL, is asked about four times a second while nothing comes; true makes next return NPG_STOPPED. */
 typedef struct npg_stream npg_stream;
-npg_status npg_stream_open(npg_stream **stream, int fd, const char *name);
+npg_status npg_stream_open(npg_stream **stream, int fd, const char *name, bool (*stopping)(void *user),
+                           void *user);
 npg_status npg_stream_next(npg_stream *stream, npg_frame *frame, npg_origin *origin);
 void npg_stream_close(npg_stream **stream);
-
-/* stopping(user) is asked about four times a second while nothing comes;
- * true makes next return NPG_STOPPED. */
-void npg_stream_set_stop(npg_stream *stream, bool (*stopping)(void *user), void *user);
 
 /* The format that npg_read_cloud would use for a path ("ply", "obj", "xyz", "npy", "pcd"), NULL for none. */
 const char *npg_reader_for(const char *path);
@@ -105,8 +103,8 @@ extern const npg_rig_settings npg_rig_usual;
 
 /* Images of one sensor at one time. */
 typedef struct npg_rig_shot {
+    int64_t number;              /* first: of the frame                       */
     char *depth, *colour, *mask; /* paths; colour and mask may be NULL        */
-    int64_t number;              /* of the frame                              */
     bool has_pose;
     double pose[12]; /* sensor to world, where the sensor moves */
 } npg_rig_shot;
@@ -121,9 +119,8 @@ typedef struct npg_rig_sensor {
     double near_m, far_m;       /* of this sensor; far 0: no limit                     */
     bool is_opengl;             /* its poses are of axes x right, y up, z backward     */
     double pose[12];            /* sensor to world, where it stands still              */
-    bool is_corrected;
-    double correction[12]; /* world to world, after the pose; of npg_rig_correct() */
-    npg_rig_shot *shots;   /* in order */
+    double correction[12];      /* world to world, after the pose; of npg_rig_correct() */
+    npg_rig_shot *shots;        /* in order */
     size_t shot_count, shot_capacity;
     float *rays; /* H x W x 2, NaN where there is none; made at the first use, owned */
 } npg_rig_sensor;
@@ -159,10 +156,6 @@ const npg_rig_shot *npg_rig_shot_of(const npg_rig *rig, size_t frame, size_t sen
 
 /* The pose (sensor to world) it is used with: settings, axes and correction applied. */
 void npg_rig_pose(const npg_rig *rig, double pose[12], size_t sensor, const npg_rig_shot *shot);
-
-/* Call visit for every image of a frame; ends with the first status that is not NPG_OK. */
-npg_status npg_rig_each_image(const npg_rig *rig, size_t frame,
-                              npg_status (*visit)(void *user, const char *path), void *user);
 
 /* Numbers that stand for all calibration a frame is made with (intrinsics, poses, settings): two rigs that
  * give one frame the same points from the same images have the same. */

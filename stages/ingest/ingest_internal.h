@@ -41,6 +41,9 @@ enum {
     NPG_SLOTS
 };
 
+/* The one that a file's header calls so, -1 for none. */
+int npg_slot_of(const char *name);
+
 typedef struct npg_builder {
     npg_origin *origin; /* loan */
     npg_purpose purpose;

@@ -75,9 +75,8 @@ static npg_status open_source(npg_live_source *live)
         return npg_error(NPG_USAGE, "option frames: \"%s\": a live source can't be counted from its end",
                          frames);
     if (settings->follow[0]) return open_follow(live);
-    NPG_TRY(npg_stream_open(&live->stream, STDIN_FILENO, "standard input"));
-    npg_stream_set_stop(live->stream, npg_worker_should_stop, live->worker);
-    return NPG_OK;
+    return npg_stream_open(&live->stream, STDIN_FILENO, "standard input", npg_worker_should_stop,
+                           live->worker);
 }
 
 static const char *name_of(const npg_live_source *live)

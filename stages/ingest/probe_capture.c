@@ -31,7 +31,7 @@ static npg_status read_stream(job *j)
     npg_stream *stream;
     npg_status status = NPG_OK;
     double begin_s = npg_clock_s();
-    NPG_TRY(npg_stream_open(&stream, STDIN_FILENO, "standard input"));
+    NPG_TRY(npg_stream_open(&stream, STDIN_FILENO, "standard input", NULL, NULL));
     for (int64_t number = 0; !status; number++) {
         npg_frame frame = {0};
         status = npg_stream_next(stream, &frame, &j->probe.origin);

@@ -27,7 +27,8 @@ static void read_as_stream(int fd)
 {
     npg_stream *stream = NULL;
     npg_origin origin = {0};
-    npg_status status = lseek(fd, 0, SEEK_SET) ? NPG_FAILED : npg_stream_open(&stream, fd, "stream");
+    npg_status status =
+        lseek(fd, 0, SEEK_SET) ? NPG_FAILED : npg_stream_open(&stream, fd, "stream", NULL, NULL);
     for (npg_frame frame = {0}; !status; npg_frame_clear(&frame))
         status = npg_stream_next(stream, &frame, &origin);
     expect(status == NPG_END || status == NPG_BAD_INPUT, "stream");

@@ -83,9 +83,9 @@ static const struct bad_file {
     {"a.ply", BYTES(PLY("element vertex 2\n" XYZ "end_header\n1.2345 2.3456 3\n")),
      "the file ends in 1 of the 2 rows"},
     {"a.ply", BYTES(PLY("element vertex 2\n" XYZ "end_header\n1 2\n3 4 5.000\n")),
-     "line 8: 2 values where element \"vertex\" has 3"},
+     "line 8: the row of element \"vertex\" ends early"},
     {"a.ply", BYTES(PLY("element vertex 2\n" XYZ "end_header\n1 2 3 4\n3 4 5\n")),
-     "line 8: more than the 3 values"},
+     "line 8: more values than element \"vertex\""},
     {"a.ply", BYTES(PLY("element vertex 2\n" XYZ "end_header\n1 2 zwei\n3 4 5\n")),
      "line 8: \"zwei\" is not a number"},
     {"a.ply", BYTES(PLY("element vertex 1\n" XYZ "end_header\n1 2 3\n4 5 6\n")),
@@ -120,11 +120,11 @@ static const struct bad_file {
     {"a.npy", BYTES("\x93NUMPY\x09\x00\x10\x00____"), "NPY version 9"},
     {"a.npy", BYTES("\x93NUMPY\x01\x00\xff\x00{'descr'"), "the file ends inside the header"},
     {"a.npy", BYTES("\x93NUMPY\x02\x00\xff\xff\xff\xff{'descr'"), "NPY header of 4294967295 bytes"},
-    {"a.npy", BYTES(NPY("\x0c", "{'nothing': }")), "NPY header: no plain type"},
+    {"a.npy", BYTES(NPY("\x0c", "{'nothing': }")), "NPY header: type (descr) is neither"},
     {"a.npy", BYTES(NPY("\x36", "{'descr': '<i4', 'fortran_order': False, 'shape': (1,3)}")),
      "neither f4 nor f8"},
     {"a.npy", BYTES(NPY("\x36", "{'descr': [('x','<f4')], 'fortran_order': False, 'shape': (1,3)}")),
-     "no plain type"},
+     "type (descr) is neither"},
     /* the header ends within the type, its last byte is that of the memory */
     {"a.npy",
      BYTES(
@@ -250,7 +250,7 @@ static const struct bad_file bad_meshes[] = {
     {"m.ply",
      BYTES(PLY("element vertex 3\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"
                "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n")),
-     "line 13: the row of a face ends early"},
+     "line 13: the row of element \"face\" ends early"},
     {"m.ply",
      BYTES(PLY("element vertex 3\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"
                "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 9\n")),

@@ -553,7 +553,7 @@ static void frames_from_a_pipe(void **state)
         npg_frame frame = {0};
         npg_origin origin = {0};
         int fd = pipe_from(all.data, all.size, step);
-        assert_int_equal(npg_stream_open(&stream, fd, "pipe"), NPG_OK);
+        assert_int_equal(npg_stream_open(&stream, fd, "pipe", NULL, NULL), NPG_OK);
         for (size_t i = 0; i < frames; i++) {
             if (npg_stream_next(stream, &frame, &origin)) fail_msg("%s", npg_error_text());
             assert_int_equal(frame.number, i);
@@ -577,7 +577,7 @@ static void a_stream_cut_anywhere(void **state)
         npg_stream *stream;
         npg_frame frame = {0};
         npg_origin origin = {0};
-        npg_status status = npg_stream_open(&stream, fileno(file), "cut");
+        npg_status status = npg_stream_open(&stream, fileno(file), "cut", NULL, NULL);
         size_t frames = 0;
         while (!status) {
             status = npg_stream_next(stream, &frame, &origin);
@@ -605,8 +605,7 @@ static void a_silent_stream_can_be_stopped(void **state)
     npg_frame frame = {0};
     npg_origin origin = {0};
     assert_int_equal(pipe(ends), 0);
-    assert_int_equal(npg_stream_open(&stream, ends[0], "silence"), NPG_OK);
-    npg_stream_set_stop(stream, stop_at_once, &asked);
+    assert_int_equal(npg_stream_open(&stream, ends[0], "silence", stop_at_once, &asked), NPG_OK);
     assert_int_equal(npg_stream_next(stream, &frame, &origin), NPG_STOPPED);
     assert_true(asked > 0);
     npg_stream_close(&stream);

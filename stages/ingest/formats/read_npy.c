@@ -32,16 +32,13 @@ static const char *value_of(const char *header, const char *key)
 
 static npg_status parse_type(array *a, const char *text, const npg_source *source)
 {
-    if (!text || (*text != '\'' && *text != '"')) return refuse_header(source, "no plain type (descr)");
-    char name[4] = {0};
-    snprintf(name, sizeof name, "%.3s", text + 1);
-    bool is_whole = strlen(name) == 3; /* else the header ends within it, and there is no text[4] */
-    if (!is_whole || !strchr("<>=", name[0]) || (text[4] != '\'' && text[4] != '"'))
+    char begin, order, kind, size, end;
+    if (!text || sscanf(text, "%c%c%c%c%c", &begin, &order, &kind, &size, &end) != 5 ||
+        !strchr("'\"", begin) || !strchr("<>=", order) || kind != 'f' || !strchr("48", size) || end != begin)
         return refuse_header(source, "type (descr) is neither f4 nor f8");
-    a->order = name[0] == '>' ? NPG_PLY_BIG : NPG_PLY_LITTLE;
-    a->type = name[2] == '8' ? NPG_PLY_DOUBLE : NPG_PLY_FLOAT;
-    if (name[1] == 'f' && (name[2] == '4' || name[2] == '8')) return NPG_OK;
-    return refuse_header(source, "type (descr) is neither f4 nor f8");
+    a->order = order == '>' ? NPG_PLY_BIG : NPG_PLY_LITTLE;
+    a->type = size == '8' ? NPG_PLY_DOUBLE : NPG_PLY_FLOAT;
+    return NPG_OK;
 }
 
 static npg_status parse_order(array *a, const char *text, const npg_source *source)

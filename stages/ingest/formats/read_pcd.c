@@ -165,7 +165,6 @@ static size_t find_colour(const pcd_header *h)
 
 static npg_status set_columns(npg_builder *b, pcd_body *body, const pcd_header *h, const npg_source *source)
 {
-    static const char *const names[] = {"x", "y", "z", "normal_x", "normal_y", "normal_z"};
     npg_column *of = body->columns.of;
     for (size_t i = 0; i < h->field_count; i++) {
         const size_t bytes = h->fields[i].size * h->fields[i].count;
@@ -173,8 +172,8 @@ static npg_status set_columns(npg_builder *b, pcd_body *body, const pcd_header *
         npg_column column = {.is_there = true,
                              .offset = body->is_packed ? body->row_size * (size_t)h->points : body->row_size,
                              .step = bytes};
-        for (size_t slot = NPG_X; slot <= NPG_NZ; slot++) {
-            if (i != find(h, names[slot])) continue;
+        const int slot = npg_slot_of(h->fields[i].name);
+        if (slot >= NPG_X && slot <= NPG_NZ && !of[slot].is_there) {
             NPG_TRY(set_type(&column.type, &h->fields[i], source));
             of[slot] = column;
             body->value[slot] = body->row_values;

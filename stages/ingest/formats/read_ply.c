@@ -199,37 +199,6 @@ static npg_status read_header(ply_header *header, npg_source *source)
 
 /* ---- the body ---- */
 
-/* What a vertex property can mean. */
-static const struct {
-    const char *name;
-    int slot;
-} slot_names[] = {{"x", NPG_X},
-                  {"y", NPG_Y},
-                  {"z", NPG_Z},
-                  {"nx", NPG_NX},
-                  {"ny", NPG_NY},
-                  {"nz", NPG_NZ},
-                  {"normal_x", NPG_NX},
-                  {"normal_y", NPG_NY},
-                  {"normal_z", NPG_NZ},
-                  {"red", NPG_RED},
-                  {"green", NPG_GREEN},
-                  {"blue", NPG_BLUE},
-                  {"alpha", NPG_ALPHA},
-                  {"r", NPG_RED},
-                  {"g", NPG_GREEN},
-                  {"b", NPG_BLUE},
-                  {"a", NPG_ALPHA},
-                  {"s", NPG_U},
-                  {"t", NPG_V},
-                  {"u", NPG_U},
-                  {"v", NPG_V},
-                  {"texture_u", NPG_U},
-                  {"texture_v", NPG_V},
-                  {"diffuse_red", NPG_RED},
-                  {"diffuse_green", NPG_GREEN},
-                  {"diffuse_blue", NPG_BLUE}};
-
 typedef struct reader {
     npg_source *source;
     ply_header *header;
@@ -253,13 +222,11 @@ static void assign_slots(reader *r)
     r->columns.format = r->header->format;
     for (size_t p = 0; p < r->vertex->property_count; p++) {
         const ply_property *property = &r->vertex->properties[p];
-        r->slot_of[p] = -1;
-        for (size_t i = 0; i < sizeof slot_names / sizeof *slot_names; i++) {
-            npg_column *column = &r->columns.of[slot_names[i].slot];
-            if (strcmp(slot_names[i].name, property->name) != 0 || column->is_there) continue;
-            r->slot_of[p] = slot_names[i].slot;
-            *column = (npg_column){true, property->type, property->offset, r->vertex->row_size};
-        }
+        int slot = npg_slot_of(property->name);
+        bool is_new = slot >= 0 && !r->columns.of[slot].is_there;
+        r->slot_of[p] = is_new ? slot : -1;
+        if (is_new)
+            r->columns.of[slot] = (npg_column){true, property->type, property->offset, r->vertex->row_size};
     }
 }
 
@@ -310,62 +277,7 @@ static npg_status find_corner_list(reader *r)
     return npg_error(NPG_BAD_INPUT, "%s: header: element face has no list vertex_indices", name);
 }
 
-/* ---- vertices ---- */
-
-static npg_status ends_early(const reader *r, const ply_element *element, uint64_t row)
-{
-    return npg_source_bad_byte(r->source, "the file ends in %llu of the %llu rows of element \"%s\"",
-                               (unsigned long long)row, (unsigned long long)element->count, element->name);
-}
-
-static npg_status next_row(reader *r, const ply_element *element, uint64_t row, const char **at,
-                           const char **end)
-{
-    npg_status status = npg_source_row(r->source, at, end);
-    return status == NPG_END ? ends_early(r, element, row) : status;
-}
-
-static npg_status parse_row(reader *r, double values[NPG_SLOTS], const char *at, const char *end)
-{
-    const ply_element *vertex = r->vertex;
-    for (size_t p = 0; p < vertex->property_count; p++) {
-        double value;
-        int slot = r->slot_of[p];
-        if (at == end)
-            return npg_source_bad_line(r->source, "%zu values where element \"vertex\" has %zu", p,
-                                       vertex->property_count);
-        NPG_TRY(npg_source_number(r->source, &value, &at, end));
-        if (slot < 0) continue;
-        bool is_colour = slot >= NPG_RED && slot <= NPG_ALPHA;
-        values[slot] = is_colour ? npg_colour_value(value, vertex->properties[p].type) : value;
-    }
-    if (at < end)
-        return npg_source_bad_line(r->source, "more than the %zu values that element \"vertex\" has",
-                                   vertex->property_count);
-    return NPG_OK;
-}
-
-static npg_status read_vertices(reader *r)
-{
-    double values[NPG_SLOTS] = {[NPG_ALPHA] = 255};
-    const char *at, *end;
-    uint64_t row, count = r->vertex->count;
-    if (r->header->format != NPG_PLY_ASCII) {
-        npg_status status =
-            npg_rows_read(r->builder, r->source, &r->columns, count, r->vertex->row_size, &row);
-        return status == NPG_END ? ends_early(r, r->vertex, row) : status;
-    }
-    if (npg_source_left(r->source) != UINT64_MAX) NPG_TRY(npg_builder_reserve(r->builder, (size_t)count, 0));
-    for (row = 0; row < count; row++) {
-        NPG_TRY(next_row(r, r->vertex, row, &at, &end));
-        NPG_TRY(parse_row(r, values, at, end));
-        NPG_TRY(npg_builder_reserve(r->builder, 1, 0));
-        npg_builder_add(r->builder, values);
-    }
-    return NPG_OK;
-}
-
-/* ---- other elements: faces, and what is skipped ---- */
+/* ---- rows ---- */
 
 /* Where a row is read: in text from `at` to `end`. */
 typedef struct cursor {
@@ -374,10 +286,17 @@ typedef struct cursor {
     const char *at, *end; /* NULL: the file is binary */
 } cursor;
 
+static npg_status ends_early(const reader *r, const ply_element *element, uint64_t row)
+{
+    return npg_source_bad_byte(r->source, "the file ends in %llu of the %llu rows of element \"%s\"",
+                               (unsigned long long)row, (unsigned long long)element->count, element->name);
+}
+
 static npg_status next_value(reader *r, cursor *c, npg_ply_type type, double *value)
 {
     size_t available, size = npg_ply_type_size(type);
-    if (c->at && c->at == c->end) return npg_source_bad_line(r->source, "the row of a face ends early");
+    if (c->at && c->at == c->end)
+        return npg_source_bad_line(r->source, "the row of element \"%s\" ends early", c->element->name);
     if (c->at) return npg_source_number(r->source, value, &c->at, c->end);
     NPG_TRY(npg_source_fill(r->source, size, &available));
     if (available < size) return ends_early(r, c->element, c->row);
@@ -443,18 +362,48 @@ static npg_status read_property(reader *r, cursor *c, const ply_property *proper
     return NPG_OK;
 }
 
+/* Of text. */
+static npg_status read_vertex(reader *r, cursor *c)
+{
+    double value, values[NPG_SLOTS] = {[NPG_ALPHA] = 255};
+    for (size_t p = 0; p < r->vertex->property_count; p++) {
+        const npg_ply_type type = r->vertex->properties[p].type;
+        int slot = r->slot_of[p];
+        NPG_TRY(next_value(r, c, type, &value));
+        bool is_colour = slot >= NPG_RED && slot <= NPG_ALPHA;
+        if (slot >= 0) values[slot] = is_colour ? npg_colour_value(value, type) : value;
+    }
+    NPG_TRY(npg_builder_reserve(r->builder, 1, 0));
+    npg_builder_add(r->builder, values);
+    return NPG_OK;
+}
+
+static npg_status read_binary_vertices(reader *r)
+{
+    uint64_t row;
+    npg_status status =
+        npg_rows_read(r->builder, r->source, &r->columns, r->vertex->count, r->vertex->row_size, &row);
+    return status == NPG_END ? ends_early(r, r->vertex, row) : status;
+}
+
 static npg_status read_rows(reader *r, const ply_element *element)
 {
-    bool is_ascii = r->header->format == NPG_PLY_ASCII, is_face = element == r->face;
+    bool is_ascii = r->header->format == NPG_PLY_ASCII, is_face = element == r->face,
+         is_vertex = element == r->vertex;
     cursor c = {.element = element};
     if (!element->property_count && !is_face) return NPG_OK;
+    if (!is_ascii && is_vertex) return read_binary_vertices(r);
     if (!is_ascii && !element->has_lists) return skip_bytes(r, &c, element->count * element->row_size);
+    if (is_vertex && npg_source_left(r->source) != UINT64_MAX)
+        NPG_TRY(npg_builder_reserve(r->builder, (size_t)element->count, 0));
     for (; c.row < element->count; c.row++) {
-        if (is_ascii) NPG_TRY(next_row(r, element, c.row, &c.at, &c.end));
+        npg_status status = is_ascii ? npg_source_row(r->source, &c.at, &c.end) : NPG_OK;
+        if (status) return status == NPG_END ? ends_early(r, element, c.row) : status;
+        if (is_vertex) NPG_TRY(read_vertex(r, &c));
         for (size_t p = 0; p < element->property_count && (is_face || !is_ascii); p++)
             NPG_TRY(read_property(r, &c, &element->properties[p]));
-        if (is_face && c.at < c.end)
-            return npg_source_bad_line(r->source, "more values than element \"face\" has");
+        if ((is_face || is_vertex) && c.at < c.end)
+            return npg_source_bad_line(r->source, "more values than element \"%s\" has", element->name);
     }
     return NPG_OK;
 }
@@ -466,10 +415,7 @@ static npg_status read_all(reader *r)
     NPG_TRY(read_header(r->header, r->source));
     NPG_TRY(find_vertex_element(r));
     NPG_TRY(find_corner_list(r));
-    for (size_t i = 0; i < r->header->element_count; i++) {
-        const ply_element *element = &r->header->elements[i];
-        NPG_TRY(element == r->vertex ? read_vertices(r) : read_rows(r, element));
-    }
+    for (size_t i = 0; i < r->header->element_count; i++) NPG_TRY(read_rows(r, &r->header->elements[i]));
     return NPG_OK;
 }
 

@@ -218,12 +218,15 @@ struct npg_stream {
     int64_t frames;
 };
 
-npg_status npg_stream_open(npg_stream **out, int fd, const char *name)
+npg_status npg_stream_open(npg_stream **out, int fd, const char *name, bool (*stopping)(void *user),
+                           void *user)
 {
     npg_stream *stream;
     *out = NULL;
     NPG_TRY(npg_alloc(&stream, NPG_FOR_FILES, sizeof *stream));
     npg_status status = npg_source_open_fd(&stream->source, fd, name);
+    if (!status) stream->source->stopping = stopping;
+    if (!status) stream->source->user = user;
     if (status) npg_release(&stream);
     *out = stream;
     return status;
@@ -234,12 +237,6 @@ void npg_stream_close(npg_stream **slot)
     if (!*slot) return;
     npg_source_close(&(*slot)->source);
     npg_release(slot);
-}
-
-void npg_stream_set_stop(npg_stream *stream, bool (*stopping)(void *user), void *user)
-{
-    stream->source->stopping = stopping;
-    stream->source->user = user;
 }
 
 /* Only these two formats say in their header where they end. */

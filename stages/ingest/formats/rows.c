@@ -13,6 +13,29 @@
 #define AWAY_MAX    16   /* spreads between origin and median: float, of 24 bits, keeps 1e-6 of the spread */
 #define BLOCK_BYTES ((size_t)64 << 10) /* decoded at a time; set by trial */
 
+int npg_slot_of(const char *name)
+{
+    static const char *const names[NPG_SLOTS] = {[NPG_X] = "x",
+                                                 [NPG_Y] = "y",
+                                                 [NPG_Z] = "z",
+                                                 [NPG_NX] = "nx normal_x",
+                                                 [NPG_NY] = "ny normal_y",
+                                                 [NPG_NZ] = "nz normal_z",
+                                                 [NPG_RED] = "red r diffuse_red",
+                                                 [NPG_GREEN] = "green g diffuse_green",
+                                                 [NPG_BLUE] = "blue b diffuse_blue",
+                                                 [NPG_ALPHA] = "alpha a",
+                                                 [NPG_U] = "u s texture_u",
+                                                 [NPG_V] = "v t texture_v"};
+    for (int slot = 0; slot < NPG_SLOTS; slot++)
+        for (const char *at = names[slot]; *at; at += strspn(at, " ")) {
+            size_t length = strcspn(at, " ");
+            if (length == strlen(name) && !memcmp(at, name, length)) return slot;
+            at += length;
+        }
+    return -1;
+}
+
 /* ---- coordinates ---- */
 
 void npg_local_of(float local[3], npg_origin *origin, const double world[3])

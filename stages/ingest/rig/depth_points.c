@@ -72,15 +72,10 @@ static bool is_blank(const npg_image *depth)
     return true;
 }
 
-static double larger(double a, double b)
-{
-    return a > b ? a : b;
-}
-
 static void fill_depths(grid *g)
 {
     const npg_rig_settings *set = &g->rig->settings;
-    double near_m = larger(g->sensor->near_m, set->near_m), far_m = g->sensor->far_m;
+    double near_m = fmax(g->sensor->near_m, set->near_m), far_m = g->sensor->far_m;
     if (set->far_m > 0 && (far_m <= 0 || set->far_m < far_m)) far_m = set->far_m;
     for (size_t i = 0; i < g->width * g->height; i++) {
         double z = g->depth.depth[i] * g->sensor->scale;
@@ -361,7 +356,7 @@ static float depth_seen(const grid *g, size_t i, bool is_removed)
 {
     bool is_hidden = g->mask.bytes && g->mask.bytes[i] < MASK_ON;
     double z = g->depth.depth[i] * g->sensor->scale,
-           near_m = larger(g->sensor->near_m, g->rig->settings.near_m);
+           near_m = fmax(g->sensor->near_m, g->rig->settings.near_m);
     if (is_hidden) return is_removed ? INFINITY : (float)z;
     if (!(z > 0)) return is_removed && !g->mask.bytes ? INFINITY : 0;
     return z < near_m ? 0 : (float)z;

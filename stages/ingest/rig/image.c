@@ -182,18 +182,16 @@ static void on_message(j_common_ptr jpeg, int level)
     if (level < 0) on_jpeg_error(jpeg);
 }
 
-static void on_progress(j_common_ptr jpeg)
-{
-    jpeg_reader *d = (jpeg_reader *)jpeg->err;
-    if (!jpeg->is_decompressor || d->jpeg.input_scan_number <= SCANS_MAX) return;
-    snprintf(d->text, sizeof d->text, "more than %d scans", SCANS_MAX);
-    longjmp(d->leave, 1);
-}
-
 static void fail(jpeg_reader *d, const char *text)
 {
     snprintf(d->text, sizeof d->text, "%s", text);
     longjmp(d->leave, 1);
+}
+
+static void on_progress(j_common_ptr jpeg)
+{
+    jpeg_reader *d = (jpeg_reader *)jpeg->err;
+    if (jpeg->is_decompressor && d->jpeg.input_scan_number > SCANS_MAX) fail(d, "too many scans");
 }
 
 static void decode_jpeg(jpeg_reader *d)

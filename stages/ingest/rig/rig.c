@@ -1,12 +1,10 @@
 /* Rig: what is one, its frames, and the pose of every shot. */
 #include "ingest/rig/rig_internal.h"
 
-#include <dirent.h>
-#include <math.h>
+#include <glob.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <xxhash.h>
 
 #include "pipeline/file.h"
@@ -23,15 +21,11 @@ bool npg_rig_ends_with(const char *name, const char *ending)
 /* A file NNNN_camera.xml, .yml or .yaml lies in the folder. */
 static bool has_camera_files(const char *folder)
 {
-    bool found = false;
-    DIR *listing = opendir(folder);
-    if (!listing) return false;
-    for (struct dirent *entry; !found && (entry = readdir(listing));)
-        found = npg_rig_ends_with(entry->d_name, "_camera.xml") ||
-                npg_rig_ends_with(entry->d_name, "_camera.yml") ||
-                npg_rig_ends_with(entry->d_name, "_camera.yaml");
-    closedir(listing);
-    return found;
+    char pattern[NPG_PATH_SIZE];
+    glob_t found = {0};
+    bool is_found = !npg_path_of(pattern, folder, "*_camera.[xy]*ml") && !glob(pattern, 0, NULL, &found);
+    globfree(&found);
+    return is_found;
 }
 
 /* Which other program has written the depth images of a folder; NULL: none that is known. */
@@ -99,11 +93,10 @@ void npg_rig_close(npg_rig **rig)
 
 npg_status npg_rig_path(npg_rig *rig, char **path, const char *name, bool must_be)
 {
-    struct stat info;
     *path =
         name[0] == '/' ? npg_arena_text(&rig->arena, name) : npg_arena_path(&rig->arena, rig->folder, name);
     NPG_TRY(npg_arena_status(&rig->arena));
-    bool is_there = !stat(*path, &info);
+    bool is_there = npg_is_there(*path);
     if (must_be && !is_there) return npg_error_errno(NPG_BAD_INPUT, "can't read %s", *path);
     return rig->settings.confine && is_there ? npg_path_confine(*path, rig->folder) : NPG_OK;
 }
@@ -120,6 +113,7 @@ npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **out)
     *sensor = (npg_rig_sensor){0};
     npg_pose_identity(sensor->pose);
     npg_pose_identity(sensor->depth_to_colour);
+    npg_pose_identity(sensor->correction);
     *out = sensor;
     return NPG_OK;
 }
@@ -152,18 +146,12 @@ static npg_status list_numbers(npg_rig *rig)
     return NPG_OK;
 }
 
-/* Shots are in order of their numbers. */
+/* Shots are in order of their numbers, which they begin with. */
 static int32_t numbered_shot(const npg_rig_sensor *sensor, int64_t number)
 {
-    size_t lo = 0, hi = sensor->shot_count;
-    while (lo < hi) {
-        size_t middle = (lo + hi) / 2;
-        if (sensor->shots[middle].number < number)
-            lo = middle + 1;
-        else
-            hi = middle;
-    }
-    return lo < sensor->shot_count && sensor->shots[lo].number == number ? (int32_t)lo : -1;
+    const npg_rig_shot *found =
+        bsearch(&number, sensor->shots, sensor->shot_count, sizeof *found, npg_order_int64);
+    return found ? (int32_t)(found - sensor->shots) : -1;
 }
 
 npg_status npg_rig_join(npg_rig *rig)
@@ -192,19 +180,6 @@ const npg_rig_shot *npg_rig_shot_of(const npg_rig *rig, size_t frame, size_t sen
     return at < 0 ? NULL : &rig->sensors[sensor].shots[at];
 }
 
-npg_status npg_rig_each_image(const npg_rig *rig, size_t frame,
-                              npg_status (*visit)(void *user, const char *path), void *user)
-{
-    for (size_t s = 0; s < rig->sensor_count; s++) {
-        const npg_rig_shot *shot = npg_rig_shot_of(rig, frame, s);
-        if (!shot) continue;
-        const char *const paths[] = {shot->depth, shot->colour, shot->mask};
-        for (size_t i = 0; i < sizeof paths / sizeof *paths; i++)
-            if (paths[i]) NPG_TRY(visit(user, paths[i]));
-    }
-    return NPG_OK;
-}
-
 /* ---- poses ---- */
 
 void npg_rig_pose(const npg_rig *rig, double out[12], size_t s, const npg_rig_shot *shot)
@@ -223,24 +198,16 @@ void npg_rig_pose(const npg_rig *rig, double out[12], size_t s, const npg_rig_sh
             pose[4 * r + 1] = -pose[4 * r + 1];
             pose[4 * r + 2] = -pose[4 * r + 2];
         }
-    if (sensor->is_corrected)
-        npg_pose_combine(out, sensor->correction, pose);
-    else
-        memcpy(out, pose, sizeof pose);
+    npg_pose_combine(out, sensor->correction, pose);
 }
 
 void npg_rig_correct(npg_rig *rig, const npg_rig_view *views)
 {
     for (size_t s = 0; s < rig->sensor_count; s++) {
-        npg_rig_sensor *sensor = &rig->sensors[s];
         double before[12];
         if (views[s].verdict != NPG_RIG_OFF) continue;
-        memcpy(before, sensor->correction, sizeof before);
-        if (sensor->is_corrected)
-            npg_pose_combine(sensor->correction, views[s].correction, before);
-        else
-            memcpy(sensor->correction, views[s].correction, sizeof before);
-        sensor->is_corrected = true;
+        memcpy(before, rig->sensors[s].correction, sizeof before);
+        npg_pose_combine(rig->sensors[s].correction, views[s].correction, before);
     }
 }
 

@@ -122,21 +122,6 @@ bool npg_rig_is_frame(const char *text)
     return split(path, &number, text);
 }
 
-/* Its points become the mesh's. */
-static npg_status give_points(npg_mesh **mesh, npg_frame *frame)
-{
-    NPG_TRY(npg_mesh_open(mesh, 0, 0));
-    (*mesh)->vert_count = frame->point_count;
-    npg_release(&(*mesh)->vert_pos);
-    npg_release(&(*mesh)->vert_normals);
-    (*mesh)->vert_pos = frame->pos_local;
-    (*mesh)->vert_normals = frame->normals;
-    (*mesh)->vert_colours = frame->colours;
-    frame->pos_local = frame->normals = NULL;
-    frame->colours = NULL;
-    return NPG_OK;
-}
-
 npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin)
 {
     char path[NPG_PATH_SIZE];
@@ -149,8 +134,14 @@ npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *ori
     size_t at = npg_rig_find(rig, number);
     npg_status status = at == SIZE_MAX ? npg_error(NPG_BAD_INPUT, "%s: the rig has no such frame", text)
                                        : npg_rig_read(rig, &frame, at, origin);
-    if (!status && !frame.point_count) status = npg_error(NPG_BAD_INPUT, "%s: the frame has no points", text);
-    if (!status) status = give_points(mesh, &frame);
+    npg_builder points = {.may_be_points = true, .vert_count = frame.point_count};
+    points.pos = frame.pos_local;
+    points.normals = frame.normals;
+    points.colours = frame.colours;
+    frame.pos_local = frame.normals = NULL;
+    frame.colours = NULL;
+    if (!status) status = npg_builder_mesh(mesh, &points, text);
+    npg_builder_clear(&points);
     npg_frame_clear(&frame);
     npg_rig_close(&rig);
     return status;
