@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "pipeline/memory.h"
 #include "pipeline/options.h"
 #include "tools/help.h"
 
@@ -209,7 +210,7 @@ static npg_status parse_short_option(npg_cli *cli, int argc, char **argv, int *i
 /* Read what --method says, before anything else on the command line is set. */
 static npg_status read_methods(npg_cli *cli, int argc, char **argv)
 {
-    for (int i = 1; cli->options && i < argc && strcmp(argv[i], "--") != 0; i++) {
+    for (int i = 1; cli->verb->with_run_options && i < argc && strcmp(argv[i], "--") != 0; i++) {
         if (!strncmp(argv[i], "--method=", 9))
             NPG_TRY(npg_options_set(cli->options, "method", argv[i] + 9));
         else if (!strcmp(argv[i], "--method") && i + 1 < argc)
@@ -245,32 +246,46 @@ static int asks_for_help(int argc, char **argv)
     return 0;
 }
 
-npg_status npg_cli_parse(npg_cli *cli, const char *name, void *values, npg_options *options, int argc,
-                         char **argv)
+static npg_status parse(npg_cli *cli, int argc, char **argv)
 {
-    const npg_verb *verb = npg_verb_find(name);
-    *cli = (npg_cli){verb, values, options, argv + 1, 0};
+    const npg_verb *verb = cli->verb;
     int help = asks_for_help(argc, argv);
     if (help == 2 && own_option(verb, "help-all")) help = 0; /* of another verb */
     if (help) {
-        npg_help_verb(stdout, verb, help == 2);
+        npg_help_verb(verb, help == 2);
         return NPG_END;
     }
     for (const npg_option *option = verb->options; option && option->name; option++)
-        npg_option_store(option, option->default_text, values);
+        npg_option_store(option, option->default_text, cli->values);
     NPG_TRY(read_methods(cli, argc, argv));
     NPG_TRY(parse_all(cli, argc, argv));
     if (cli->operand_count < verb->operands_min)
-        return npg_error(NPG_USAGE, "missing operand; usage: neupig %s %s", name, verb->operands);
+        return npg_error(NPG_USAGE, "missing operand; usage: neupig %s %s", verb->name, verb->operands);
     if (cli->operand_count > verb->operands_max)
         return npg_error(NPG_USAGE, "unexpected operand \"%s\"; usage: neupig %s %s",
-                         cli->operands[verb->operands_max], name, verb->operands);
+                         cli->operands[verb->operands_max], verb->name, verb->operands);
     return NPG_OK;
 }
 
-int npg_cli_end(const char *verb, npg_status status)
+void npg_cli_print(json_t *value)
 {
-    if (status == NPG_END) status = NPG_OK;
-    if (status < 0) fprintf(stderr, "neupig %s: %s\n", verb, npg_error_text());
-    return npg_status_exit_code(status);
+    json_dumpf(value, stdout, JSON_INDENT(1) | JSON_REAL_PRECISION(12));
+    putchar('\n');
+    json_decref(value);
+}
+
+int npg_cli_run(const npg_verb *verb, int argc, char **argv)
+{
+    npg_cli cli = {.verb = verb, .operands = argv + 1};
+    size_t size = 1; /* of what the table names; no value is larger than a pointer */
+    for (const npg_option *option = verb->options; option && option->name; option++)
+        if (size < option->offset + sizeof(void *)) size = option->offset + sizeof(void *);
+    npg_status status = npg_alloc(&cli.values, NPG_FOR_RUN, size);
+    if (!status) status = npg_options_open(&cli.options);
+    if (!status) status = parse(&cli, argc, argv);
+    if (!status) status = verb->main(&cli);
+    if (status < 0) fprintf(stderr, "neupig %s: %s\n", verb->name, npg_error_text());
+    npg_options_close(&cli.options);
+    npg_release(&cli.values);
+    return status == NPG_END ? 0 : npg_status_exit_code(status);
 }

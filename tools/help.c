@@ -48,57 +48,57 @@ void npg_help_limits(char *out, size_t size, const npg_option_info *option)
 }
 
 /* Print `size` bytes of text in words, wrapped; the cursor stands at *column. */
-static void print_wrapped(FILE *out, const char *text, size_t size, int *column, int indent)
+static void print_wrapped(const char *text, size_t size, int *column, int indent)
 {
     for (const char *end = text + size; text < end; text += strspn(text, " ")) {
         int length = (int)strcspn(text, " ");
         if (length > end - text) length = (int)(end - text);
         if (*column + 1 + length > HELP_WIDTH) {
-            fprintf(out, "\n%*s", indent, "");
+            printf("\n%*s", indent, "");
             *column = indent;
         } else if (*column > indent) {
-            fputc(' ', out);
+            putchar(' ');
             ++*column;
         }
-        fprintf(out, "%.*s", length, text);
+        printf("%.*s", length, text);
         *column += length;
         text += length;
     }
 }
 
-static void print_option(FILE *out, const npg_option_info *option, bool is_short)
+static void print_option(const npg_option_info *option, bool is_short)
 {
     char spelled[SPELL_LIMIT], limits[LIMITS_LIMIT], bracketed[LIMITS_LIMIT + 4];
     const char *end = is_short ? strstr(option->help, ". ") : NULL;
     npg_help_spell(spelled, sizeof spelled, option);
     npg_help_limits(limits, sizeof limits, option);
-    int column = fprintf(out, "  %s%s", option->use == NPG_USE_PART ? "  " : "", spelled);
+    int column = printf("  %s%s", option->use == NPG_USE_PART ? "  " : "", spelled);
     if (column + 1 > HELP_INDENT) {
-        fputc('\n', out);
+        putchar('\n');
         column = 0;
     }
-    fprintf(out, "%*s", HELP_INDENT - column, "");
+    printf("%*s", HELP_INDENT - column, "");
     column = HELP_INDENT;
-    print_wrapped(out, option->help, end ? (size_t)(end - option->help) : strlen(option->help), &column,
+    print_wrapped(option->help, end ? (size_t)(end - option->help) : strlen(option->help), &column,
                   HELP_INDENT);
     if (limits[0] && !is_short) {
         snprintf(bracketed, sizeof bracketed, "(%s)", limits);
-        print_wrapped(out, bracketed, strlen(bracketed), &column, HELP_INDENT);
+        print_wrapped(bracketed, strlen(bracketed), &column, HELP_INDENT);
     }
-    fputc('\n', out);
+    putchar('\n');
 }
 
 /* ---- a verb ---- */
 
-static void print_parts(FILE *out, const char *list)
+static void print_parts(const char *list)
 {
     npg_option_info part = {.struct_size = sizeof part};
     for (size_t i = 0; npg_options_describe(i, &part) == NPG_OK; i++)
         if (part.use == NPG_USE_PART && !strcmp(npg_option_list_of(part.name)->name, list))
-            print_option(out, &part, false);
+            print_option(&part, false);
 }
 
-static void print_options(FILE *out, const npg_verb *verb, bool all)
+static void print_options(const npg_verb *verb, bool all)
 {
     npg_option_info info;
     const char *group = "";
@@ -106,29 +106,29 @@ static void print_options(FILE *out, const npg_verb *verb, bool all)
     for (size_t i = 0; npg_cli_option(&info, &is_short, verb, i) == NPG_OK; i++) {
         if (is_run && !all && !is_short) continue;
         if ((all || !is_run) && strcmp(group, info.stage) != 0)
-            fprintf(out, "\n%s%s:\n", is_run ? "" : "Options of neupig ", info.stage);
+            printf("\n%s%s:\n", is_run ? "" : "Options of neupig ", info.stage);
         group = info.stage;
-        print_option(out, &info, is_run && !all);
-        if (all && is_run && npg_option_list_of(info.name)) print_parts(out, info.name);
+        print_option(&info, is_run && !all);
+        if (all && is_run && npg_option_list_of(info.name)) print_parts(info.name);
     }
 }
 
-void npg_help_verb(FILE *out, const npg_verb *verb, bool all)
+void npg_help_verb(const npg_verb *verb, bool all)
 {
     int column = 0;
     bool is_run = verb->main == npg_verb_run, is_brief = is_run && !all;
     const char *end = is_brief ? strstr(verb->text, ".  ") : NULL;
-    fprintf(out, "Usage: neupig %s %s%s%s\n", verb->name, verb->options ? "[options]" : "",
-            verb->options && verb->operands[0] ? " " : "", verb->operands);
-    if (!is_brief) fputc('\n', out);
-    print_wrapped(out, verb->text, end ? (size_t)(end + 1 - verb->text) : strlen(verb->text), &column, 0);
-    fputc('\n', out);
-    print_options(out, verb, all);
+    printf("Usage: neupig %s %s%s%s\n", verb->name, verb->options ? "[options]" : "",
+           verb->options && verb->operands[0] ? " " : "", verb->operands);
+    if (!is_brief) putchar('\n');
+    print_wrapped(verb->text, end ? (size_t)(end + 1 - verb->text) : strlen(verb->text), &column, 0);
+    putchar('\n');
+    print_options(verb, all);
     if (is_brief)
         fputs("All options: neupig help run --help-all; names and keys of methods: neupig help method.\n",
-              out);
+              stdout);
     if (!is_run && verb->with_run_options)
-        fputs("\nThe options of neupig run count here as well (neupig help run --help-all).\n", out);
+        fputs("\nThe options of neupig run count here as well (neupig help run --help-all).\n", stdout);
 }
 
 void npg_help_verbs(FILE *out)
@@ -144,17 +144,17 @@ void npg_help_verbs(FILE *out)
           out);
 }
 
-void npg_help_method(FILE *out)
+void npg_help_method(void)
 {
     npg_option_info info = {.struct_size = sizeof info};
     fputs("--method NAME, --method FILE.json, or --method '{\"preset\": \"NAME\", \"KEY\": VALUE, ...}'; "
           "several add up.\n\nNames:\n",
-          out);
+          stdout);
     for (const npg_preset *preset = npg_presets; preset->name; preset++)
-        fprintf(out, "  %-26s%s\n", preset->name, preset->help);
-    fputs("\nKeys, beside all options of neupig run:\n", out);
+        printf("  %-26s%s\n", preset->name, preset->help);
+    fputs("\nKeys, beside all options of neupig run:\n", stdout);
     for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
-        if (info.use == NPG_USE_METHOD) print_option(out, &info, false);
+        if (info.use == NPG_USE_METHOD) print_option(&info, false);
 }
 
 /* ---- as JSON ---- */
@@ -186,14 +186,7 @@ static json_t *schema_of(const npg_option_info *option)
     return schema;
 }
 
-static void print_json(FILE *out, json_t *value)
-{
-    json_dumpf(value, out, JSON_INDENT(1) | JSON_REAL_PRECISION(12));
-    fputc('\n', out);
-    json_decref(value);
-}
-
-void npg_help_verb_json(FILE *out, const npg_verb *verb)
+void npg_help_verb_json(const npg_verb *verb)
 {
     npg_option_info info;
     char spelled[SPELL_LIMIT];
@@ -206,11 +199,11 @@ void npg_help_verb_json(FILE *out, const npg_verb *verb)
         json_object_set_new(option, "group", json_string(info.stage));
         json_array_append_new(options, option);
     }
-    print_json(out, json_pack("{ss ss ss so}", "verb", verb->name, "operands", verb->operands, "help",
-                              verb->text, "options", options));
+    npg_cli_print(json_pack("{ss ss ss so}", "verb", verb->name, "operands", verb->operands, "help",
+                            verb->text, "options", options));
 }
 
-void npg_help_method_json(FILE *out)
+void npg_help_method_json(void)
 {
     npg_option_info info = {.struct_size = sizeof info};
     json_t *properties = json_object();
@@ -220,14 +213,14 @@ void npg_help_method_json(FILE *out)
     for (const npg_option_list *list = npg_option_lists; list->name; list++)
         json_object_set_new(properties, list->name,
                             json_pack("{ss ss}", "description", list->help, "type", "string"));
-    print_json(out, json_pack("{ss ss ss so sb}", "$schema", "https://json-schema.org/draft/2020-12/schema",
-                              "title", "method of neupig run", "type", "object", "properties", properties,
-                              "additionalProperties", 0));
+    npg_cli_print(json_pack("{ss ss ss so sb}", "$schema", "https://json-schema.org/draft/2020-12/schema",
+                            "title", "method of neupig run", "type", "object", "properties", properties,
+                            "additionalProperties", 0));
 }
 
 /* ---- files of a run ---- */
 
-static void print_keys(FILE *out, const json_t *schema, const char *path)
+static void print_keys(const json_t *schema, const char *path)
 {
     const char *key;
     json_t *value, *items = json_object_get(schema, "items");
@@ -236,24 +229,24 @@ static void print_keys(FILE *out, const json_t *schema, const char *path)
     {
         const char *help = json_string_value(json_object_get(value, "description"));
         snprintf(name, sizeof name, "%s%s%s", path, *path ? "." : "", key);
-        fprintf(out, "  %-42s %s\n", name, help ? help : "");
-        print_keys(out, value, name);
+        printf("  %-42s %s\n", name, help ? help : "");
+        print_keys(value, name);
     }
     snprintf(name, sizeof name, "%s[]", path);
-    if (items) print_keys(out, items, name);
+    if (items) print_keys(items, name);
 }
 
-bool npg_help_file(FILE *out, const char *name, bool as_json)
+bool npg_help_file(const char *name, bool as_json)
 {
     bool is_done = !strcmp(name, "done");
     const char *text = is_done ? npg_schema_of_done : npg_schema_of_report;
     if (!is_done && strcmp(name, "report") != 0) return false;
     json_t *schema = as_json ? NULL : json_loads(text, 0, NULL);
     if (as_json)
-        fputs(text, out);
+        fputs(text, stdout);
     else
-        fprintf(out, "%s.json: %s\n\n", name, json_string_value(json_object_get(schema, "description")));
-    print_keys(out, schema, "");
+        printf("%s.json: %s\n\n", name, json_string_value(json_object_get(schema, "description")));
+    print_keys(schema, "");
     json_decref(schema);
     return true;
 }

@@ -116,17 +116,15 @@ const npg_verb *npg_verb_find(const char *name)
     return NULL;
 }
 
-static int unknown_verb(const char *name)
+static npg_status unknown_verb(const char *name)
 {
     npg_nearest nearest = npg_nearest_to(name);
     for (const npg_verb *verb = npg_verbs; verb->name; verb++) npg_nearest_offer(&nearest, verb->name);
     if (!strcmp(name, "tune"))
-        fputs("neupig: verb tune went: the set of kernel parameters is chosen by device\n", stderr);
-    else if (nearest.word)
-        fprintf(stderr, "neupig: there is no verb \"%s\"; did you mean %s?\n", name, nearest.word);
-    else
-        fprintf(stderr, "neupig: there is no verb \"%s\"; neupig help lists them\n", name);
-    return npg_status_exit_code(NPG_USAGE);
+        return npg_error(NPG_USAGE, "verb tune went: the set of kernel parameters is chosen by device");
+    if (nearest.word)
+        return npg_error(NPG_USAGE, "there is no verb \"%s\"; did you mean %s?", name, nearest.word);
+    return npg_error(NPG_USAGE, "there is no verb \"%s\"; neupig help lists them", name);
 }
 
 typedef struct help_settings {
@@ -143,32 +141,27 @@ const npg_option npg_help_options[] = {
     {0}};
 /* clang-format on */
 
-int npg_verb_help(int argc, char **argv)
+npg_status npg_verb_help(const npg_cli *cli)
 {
-    npg_cli cli;
-    help_settings s;
-    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (status) return npg_cli_end(argv[0], status);
-    const char *subject = cli.operand_count ? cli.operands[0] : "";
-    bool is_method = !strcmp(subject, "method");
+    const help_settings *s = cli->values;
+    const char *subject = cli->operand_count ? cli->operands[0] : "";
     const npg_verb *verb = npg_verb_find(subject);
-    if (npg_help_file(stdout, subject, s.json)) return 0;
-    if (!verb && !is_method && *subject) return unknown_verb(subject);
     if (!*subject)
         npg_help_verbs(stdout);
-    else if (is_method)
-        s.json ? npg_help_method_json(stdout) : npg_help_method(stdout);
-    else
-        s.json ? npg_help_verb_json(stdout, verb) : npg_help_verb(stdout, verb, s.all);
-    return 0;
+    else if (!strcmp(subject, "method"))
+        s->json ? npg_help_method_json() : npg_help_method();
+    else if (verb)
+        s->json ? npg_help_verb_json(verb) : npg_help_verb(verb, s->all);
+    else if (!npg_help_file(subject, s->json))
+        return unknown_verb(subject);
+    return NPG_OK;
 }
 
-int npg_verb_version(int argc, char **argv)
+npg_status npg_verb_version(const npg_cli *cli)
 {
-    npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], NULL, NULL, argc, argv);
-    if (!status) printf("neupig %s\n", npg_version());
-    return npg_cli_end(argv[0], status);
+    (void)cli;
+    printf("neupig %s\n", npg_version());
+    return NPG_OK;
 }
 
 /* Output that could not be written (a full disk, a closed pipe) is a failure too. */
@@ -207,6 +200,8 @@ int main(int argc, char **argv)
     if (!strcmp(name, "--help") || !strcmp(name, "-h")) argv[1] = help;
     if (!strcmp(name, "--version") || !strcmp(name, "-V")) argv[1] = version;
     const npg_verb *verb = npg_verb_find(argv[1]);
-    if (!verb) return unknown_verb(name);
-    return close_stdout(verb->main(argc - 1, argv + 1));
+    if (verb) return close_stdout(npg_cli_run(verb, argc - 1, argv + 1));
+    npg_status status = unknown_verb(name);
+    fprintf(stderr, "neupig: %s\n", npg_error_text());
+    return npg_status_exit_code(status);
 }

@@ -23,8 +23,10 @@ const npg_option npg_append_options[] = {
 /* clang-format on */
 
 /* A job that is not done yet is first brought to its end as it was begun. */
-static npg_status append(npg_options *options, const npg_cli *cli, const settings *s)
+npg_status npg_verb_append(const npg_cli *cli)
 {
+    const settings *s = cli->values;
+    npg_options *options = cli->options;
     npg_reporter reporter;
     NPG_TRY(npg_segments_refuse(cli->operands[0], cli->verb->name, true));
     NPG_TRY(npg_options_load_job(options, cli->operands[0]));
@@ -38,16 +40,4 @@ static npg_status append(npg_options *options, const npg_cli *cli, const setting
     if (status == NPG_OK || status == NPG_PARTIAL) NPG_TRY(npg_segments_drop_outdated(cli->operands[0]));
     if (reporter.show != NPG_SHOW_JSON) npg_run_job_results(cli->verb->name, cli->operands[0], status);
     return status;
-}
-
-int npg_verb_append(int argc, char **argv)
-{
-    settings s;
-    npg_cli cli;
-    npg_options *options = NULL;
-    npg_status status = npg_options_open(&options);
-    if (!status) status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (!status) status = append(options, &cli, &s);
-    npg_options_close(&options);
-    return npg_cli_end(argv[0], status);
 }

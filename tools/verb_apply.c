@@ -35,30 +35,23 @@ const npg_option npg_apply_options[] = {
     {0}};
 /* clang-format on */
 
-static npg_status apply(npg_applied *applied, const settings *s, const char *job)
+npg_status npg_verb_apply(const npg_cli *cli)
 {
+    const settings *s = cli->values;
+    const char *job = cli->operands[0];
+    npg_applied applied = {.struct_size = sizeof applied};
     static const char *const endings[] = {NULL, "ply", "obj"}; /* as the words of --format */
     const npg_apply_settings all = {sizeof all,         job,          s->mesh,      s->output,   s->prefix,
                                     endings[s->format], s->fps_scale, s->far_share, s->overwrite};
     NPG_TRY(npg_segments_refuse(job, "apply", false));
-    npg_status status = npg_apply(applied, &all);
-    if (applied->far_count)
+    npg_status status = npg_apply(&applied, &all);
+    if (applied.far_count)
         fprintf(stderr,
                 "neupig apply: %zu of %zu points of %s lie farther than %g diagonals from the reference; "
                 "the worst, point %zu, %.3g away (%.3g diagonals)\n",
-                applied->far_count, applied->point_count, s->mesh, s->far_share, applied->worst,
-                applied->worst_dist, applied->worst_share);
+                applied.far_count, applied.point_count, s->mesh, s->far_share, applied.worst,
+                applied.worst_dist, applied.worst_share);
     NPG_TRY(status);
-    printf("%zu frames of %s in %s\n", applied->frames, s->mesh, s->output);
-    return applied->far_count ? NPG_PARTIAL : NPG_OK;
-}
-
-int npg_verb_apply(int argc, char **argv)
-{
-    settings s;
-    npg_cli cli;
-    npg_applied applied = {.struct_size = sizeof applied};
-    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (!status) status = apply(&applied, &s, cli.operands[0]);
-    return npg_cli_end(argv[0], status);
+    printf("%zu frames of %s in %s\n", applied.frames, s->mesh, s->output);
+    return applied.far_count ? NPG_PARTIAL : NPG_OK;
 }

@@ -86,8 +86,9 @@ static npg_status report(npg_batch *batch, const settings *s)
     return status_of(batch, npg_batch_exit_code(batch, true, false));
 }
 
-static npg_status open_batch(npg_batch **batch, const npg_cli *cli, const settings *s)
+static npg_status open_batch(npg_batch **batch, const npg_cli *cli)
 {
+    const settings *s = cli->values;
     const npg_batch_given given = {cli->options, s->max_time_s < 0 ? -1 : s->max_time_s, s->segments};
     if (s->task_index >= s->task_count)
         return npg_error(NPG_USAGE,
@@ -99,20 +100,15 @@ static npg_status open_batch(npg_batch **batch, const npg_cli *cli, const settin
     return NPG_OK;
 }
 
-int npg_verb_batch(int argc, char **argv)
+npg_status npg_verb_batch(const npg_cli *cli)
 {
-    settings s;
-    npg_cli cli;
+    const settings *s = cli->values;
     npg_batch *batch = NULL;
-    npg_options *options = NULL;
-    npg_status status = npg_options_open(&options);
-    if (!status) status = npg_cli_parse(&cli, argv[0], &s, options, argc, argv);
-    if (!status) status = open_batch(&batch, &cli, &s);
-    if (!status && s.list)
+    npg_status status = open_batch(&batch, cli);
+    if (!status && s->list)
         print_names(batch);
     else if (!status)
-        status = s.report ? report(batch, &s) : run(batch, &s);
+        status = s->report ? report(batch, s) : run(batch, s);
     npg_batch_close(&batch);
-    npg_options_close(&options);
-    return npg_cli_end(argv[0], status);
+    return status;
 }

@@ -289,7 +289,7 @@ static npg_status measure(bench *b)
 
 /* ---- the report ---- */
 
-static npg_status print_json(const bench *b)
+static void print_json(const bench *b)
 {
     json_t *root = json_pack("{s:s, s:{s:I, s:I, s:I}, s:O}", "version", npg_version(), "sizes", "vertices",
                              (json_int_t)b->mesh->vert_count, "points", (json_int_t)b->s.points, "frames",
@@ -298,9 +298,7 @@ static npg_status print_json(const bench *b)
         json_object_set_new(root, "device",
                             json_pack("{s:s, s:s}", "name", npg_device_facts(b->device)->name, "tuning",
                                       npg_device_tuning(b->device)->name));
-    int failed = json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(6)) || puts("") < 0;
-    json_decref(root);
-    return failed ? npg_error(NPG_DISK, "standard output can't be written") : NPG_OK;
+    npg_cli_print(root);
 }
 
 static void print_table(const bench *b)
@@ -330,16 +328,12 @@ static void close_bench(bench *b)
     json_decref(b->rows);
 }
 
-int npg_verb_bench(int argc, char **argv)
+npg_status npg_verb_bench(const npg_cli *cli)
 {
-    bench b = {.arena = {.purpose = NPG_FOR_RUN}};
-    npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], &b.s, NULL, argc, argv);
-    if (status) return npg_cli_end(argv[0], status);
-    b.rows = json_object();
-    status = measure(&b);
-    if (!status && b.s.json) status = print_json(&b);
-    if (!status && !b.s.json) print_table(&b);
+    const settings *s = cli->values;
+    bench b = {.s = *s, .arena = {.purpose = NPG_FOR_RUN}, .rows = json_object()};
+    npg_status status = measure(&b);
+    if (!status) s->json ? print_json(&b) : print_table(&b);
     close_bench(&b);
-    return npg_cli_end(argv[0], status);
+    return status;
 }

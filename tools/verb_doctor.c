@@ -4,7 +4,6 @@
 #include <meshoptimizer.h>
 #include <png.h>
 #include <stddef.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include <xxhash.h>
@@ -127,27 +126,19 @@ static npg_status status_of(const json_t *devices)
     return NPG_OK;
 }
 
-int npg_verb_doctor(int argc, char **argv)
+npg_status npg_verb_doctor(const npg_cli *cli)
 {
-    settings s;
-    npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (status) return npg_cli_end(argv[0], status);
+    const settings *s = cli->values;
     json_t *machine = describe_machine(), *libraries = list_libraries(), *devices = json_array();
-    status = list_devices(devices);
-    if (s.json) {
-        json_t *all =
-            json_pack("{s:O,s:O,s:O}", "machine", machine, "libraries", libraries, "devices", devices);
-        char *text = json_dumps(all, JSON_INDENT(1));
-        puts(text ? text : "{}");
-        free(text);
-        json_decref(all);
-    } else {
+    npg_status status = list_devices(devices);
+    if (s->json)
+        npg_cli_print(
+            json_pack("{s:O,s:O,s:O}", "machine", machine, "libraries", libraries, "devices", devices));
+    else
         print_text(machine, libraries, devices);
-    }
     if (!status) status = status_of(devices);
     json_decref(machine);
     json_decref(libraries);
     json_decref(devices);
-    return npg_cli_end(argv[0], status);
+    return status;
 }

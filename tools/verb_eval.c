@@ -2,7 +2,6 @@
 #include <jansson.h>
 #include <math.h>
 #include <stddef.h>
-#include <stdlib.h>
 
 #include "pipeline/json_file.h"
 #include "tools/cli.h"
@@ -92,11 +91,8 @@ static void print_json(const npg_eval_figures *e, const told *t)
     json_object_set_new(more, "bad_area", npg_json_real(e->bad_area));
     json_object_update(object, more);
     json_object_set(object, "per_frame", t->frames);
-    char *text = json_dumps(object, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
-    puts(text ? text : "{}");
-    free(text);
     json_decref(more);
-    json_decref(object);
+    npg_cli_print(object);
 }
 
 static void print_text(const npg_eval_figures *e, const settings *s)
@@ -113,27 +109,24 @@ static void print_text(const npg_eval_figures *e, const settings *s)
     putchar('\n');
 }
 
-int npg_verb_eval(int argc, char **argv)
+npg_status npg_verb_eval(const npg_cli *cli)
 {
-    settings s;
-    npg_cli cli;
+    const settings *s = cli->values;
     npg_eval_figures found = {.struct_size = sizeof found};
-    told t = {&s, json_array()};
-    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (!status) npg_cli_warn_of_damage(argv[0], cli.operands[0]);
-    if (!status)
-        status = npg_eval(&found, &(npg_eval_settings){.struct_size = sizeof(npg_eval_settings),
-                                                       .predicted = cli.operands[0],
-                                                       .truth = cli.operands[1],
-                                                       .frames = s.frames,
-                                                       .points_only = s.points_only,
-                                                       .samples = (size_t)s.samples,
-                                                       .seed = (uint64_t)s.seed,
-                                                       .tau = s.tau,
-                                                       .user = &t,
-                                                       .frame = tell_frame});
-    if (!status && s.json) print_json(&found, &t);
-    if (!status && !s.json) print_text(&found, &s);
+    told t = {s, json_array()};
+    npg_cli_warn_of_damage("eval", cli->operands[0]);
+    npg_status status = npg_eval(&found, &(npg_eval_settings){.struct_size = sizeof(npg_eval_settings),
+                                                              .predicted = cli->operands[0],
+                                                              .truth = cli->operands[1],
+                                                              .frames = s->frames,
+                                                              .points_only = s->points_only,
+                                                              .samples = (size_t)s->samples,
+                                                              .seed = (uint64_t)s->seed,
+                                                              .tau = s->tau,
+                                                              .user = &t,
+                                                              .frame = tell_frame});
+    if (!status && s->json) print_json(&found, &t);
+    if (!status && !s->json) print_text(&found, s);
     json_decref(t.frames);
-    return npg_cli_end(argv[0], status);
+    return status;
 }

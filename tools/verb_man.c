@@ -76,8 +76,9 @@ static void put_methods(void)
     put_rows(NPG_USE_METHOD, NULL);
 }
 
-static void print_manual(void)
+npg_status npg_verb_man(const npg_cli *cli)
 {
+    (void)cli;
     static const char *const codes[][2] = {
         {"0", "done"},
         {"1", "failed"},
@@ -102,12 +103,5 @@ static void print_manual(void)
     fputs(".SH EXIT STATUS\n", stdout);
     for (size_t i = 0; i < sizeof codes / sizeof *codes; i++)
         printf(".TP\n.B %s\n%s\n", codes[i][0], codes[i][1]);
-}
-
-int npg_verb_man(int argc, char **argv)
-{
-    npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], NULL, NULL, argc, argv);
-    if (!status) print_manual();
-    return npg_cli_end(argv[0], status);
+    return NPG_OK;
 }

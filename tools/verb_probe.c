@@ -19,18 +19,13 @@ const npg_option npg_probe_options[] = {
     {0}};
 /* clang-format on */
 
-int npg_verb_probe(int argc, char **argv)
+npg_status npg_verb_probe(const npg_cli *cli)
 {
-    settings s;
-    npg_cli cli;
-    npg_options *options = NULL;
+    const settings *s = cli->values;
     npg_capture_facts *facts = NULL;
-    npg_status status = npg_options_open(&options);
-    if (!status) status = npg_cli_parse(&cli, argv[0], &s, options, argc, argv);
-    if (!status) status = npg_options_set(options, "input", cli.operands[0]);
-    if (!status) status = npg_capture_probe(&facts, options);
-    if (facts) fputs(s.json ? facts->json : facts->text, stdout);
+    NPG_TRY(npg_options_set(cli->options, "input", cli->operands[0]));
+    npg_status status = npg_capture_probe(&facts, cli->options);
+    if (facts) fputs(s->json ? facts->json : facts->text, stdout);
     npg_capture_facts_close(&facts);
-    npg_options_close(&options);
-    return npg_cli_end(argv[0], status);
+    return status;
 }

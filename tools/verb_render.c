@@ -85,14 +85,11 @@ static npg_status draw(const npg_listing *files, const settings *s)
     return NPG_OK;
 }
 
-int npg_verb_render(int argc, char **argv)
+npg_status npg_verb_render(const npg_cli *cli)
 {
-    settings s;
     npg_listing files = {.arena = &(npg_arena){.purpose = NPG_FOR_FILES}};
-    npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (!status) status = list_files(&files, &s, &cli);
-    if (!status) status = draw(&files, &s);
+    npg_status status = list_files(&files, cli->values, cli);
+    if (!status) status = draw(&files, cli->values);
     npg_arena_release(files.arena);
-    return npg_cli_end(argv[0], status);
+    return status;
 }

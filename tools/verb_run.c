@@ -183,29 +183,21 @@ static npg_status check_paths(npg_options *options, const npg_cli *cli)
     return NPG_OK;
 }
 
-static npg_status run_or_segment(const npg_options *options, const settings *s, npg_reporter *reporter)
+npg_status npg_verb_run(const npg_cli *cli)
 {
-    if (s->segments == NPG_SEGMENTS_AUTO) return npg_segments_run(options, reporter);
-    NPG_TRY(npg_segments_require_none(options));
-    return npg_run_job(options, reporter);
-}
-
-int npg_verb_run(int argc, char **argv)
-{
-    settings s;
-    npg_cli cli;
+    const settings *s = cli->values;
+    const char *verb = cli->verb->name, *output;
     npg_reporter reporter;
-    npg_options *options = NULL;
-    npg_status status = npg_options_open(&options);
-    if (!status) status = npg_cli_parse(&cli, argv[0], &s, options, argc, argv);
-    if (!status) status = check_paths(options, &cli);
-    if (!status) {
-        npg_reporter_init(&reporter, &s.shown);
-        status = npg_reporter_open_log(&reporter, s.log_file, npg_options_get(options, "output"));
-        if (!status) status = run_or_segment(options, &s, &reporter);
-        if (reporter.show != NPG_SHOW_JSON)
-            npg_run_job_results(argv[0], npg_options_get(options, "output"), status);
+    NPG_TRY(check_paths(cli->options, cli));
+    output = npg_options_get(cli->options, "output");
+    npg_reporter_init(&reporter, &s->shown);
+    npg_status status = npg_reporter_open_log(&reporter, s->log_file, output);
+    if (!status && s->segments == NPG_SEGMENTS_AUTO) {
+        status = npg_segments_run(cli->options, &reporter);
+    } else if (!status) {
+        status = npg_segments_require_none(cli->options);
+        if (!status) status = npg_run_job(cli->options, &reporter);
     }
-    npg_options_close(&options);
-    return npg_cli_end(argv[0], status);
+    if (reporter.show != NPG_SHOW_JSON) npg_run_job_results(verb, output, status);
+    return status;
 }

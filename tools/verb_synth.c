@@ -185,8 +185,9 @@ static npg_status make_frames(const settings *s, moving *f, npg_scanned *points,
     return NPG_OK;
 }
 
-static npg_status make_capture(const settings *s, npg_figure *kind)
+npg_status npg_synth(const npg_cli *cli, npg_figure *kind)
 {
+    const settings *s = cli->values;
     moving f = {kind, {0}, NULL};
     npg_scanned points = {0};
     size_t total = 0;
@@ -210,17 +211,8 @@ static npg_status make_capture(const settings *s, npg_figure *kind)
     return status;
 }
 
-int npg_synth(int argc, char **argv, npg_figure *figure)
-{
-    settings s;
-    npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, "synth", &s, NULL, argc, argv);
-    if (!status) status = make_capture(&s, figure);
-    return npg_cli_end("synth", status);
-}
-
-int npg_verb_synth(int argc, char **argv)
+npg_status npg_verb_synth(const npg_cli *cli)
 {
     npg_figure walker = npg_walker;
-    return npg_synth(argc, argv, &walker);
+    return npg_synth(cli, &walker);
 }

@@ -16,17 +16,18 @@ void npg_cli_warn_of_damage(const char *verb, const char *folder)
 }
 
 /* All folders are looked at; the first that is damaged says how it ends. */
-int npg_verb_verify(int argc, char **argv)
+npg_status npg_verb_verify(const npg_cli *cli)
 {
-    npg_cli cli;
-    npg_status worst = npg_cli_parse(&cli, argv[0], NULL, NULL, argc, argv);
-    if (worst) return npg_cli_end(argv[0], worst);
-    for (int i = 0; i < cli.operand_count; i++) {
+    npg_status worst = NPG_OK;
+    int bad = 0;
+    for (int i = 0; i < cli->operand_count; i++) {
         npg_verified found = {.struct_size = sizeof found};
-        npg_status status = npg_verify(&found, cli.operands[i], NULL, tell);
-        if (!status) printf("%s: %zu files as they were written\n", cli.operands[i], found.files);
-        if (status && !found.files) npg_cli_end(argv[0], status);
+        npg_status status = npg_verify(&found, cli->operands[i], NULL, tell);
+        if (!status) printf("%s: %zu files as they were written\n", cli->operands[i], found.files);
+        if (status && !found.files) tell(NULL, npg_error_text());
         if (!worst) worst = status;
+        bad += status != NPG_OK;
     }
-    return npg_status_exit_code(worst);
+    return worst ? npg_error(worst, "%d of %d are not as they were written", bad, cli->operand_count)
+                 : NPG_OK;
 }

@@ -36,8 +36,9 @@ static npg_status choose_output(char **output, const settings *s, const npg_cli 
     return npg_join_path(output, cli->operands[0], "view.html");
 }
 
-static npg_status write_page(const settings *s, const npg_cli *cli)
+npg_status npg_verb_view(const npg_cli *cli)
 {
+    const settings *s = cli->values;
     npg_view_facts facts;
     char *output;
     if (s->live && cli->operand_count != 1)
@@ -58,13 +59,4 @@ static npg_status write_page(const settings *s, const npg_cli *cli)
                (double)facts.bytes / 1e6);
     npg_release(&output);
     return status;
-}
-
-int npg_verb_view(int argc, char **argv)
-{
-    settings s;
-    npg_cli cli;
-    npg_status status = npg_cli_parse(&cli, argv[0], &s, NULL, argc, argv);
-    if (!status) status = write_page(&s, &cli);
-    return npg_cli_end(argv[0], status);
 }

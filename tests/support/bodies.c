@@ -182,15 +182,15 @@ static void pose_hands(const npg_body *body, float *vert_pos, const npg_moment *
 /* ---- the program ---- */
 
 /* The verb's row, for its options (tools/cli.c). */
-static const npg_verb synth = {"synth", "--body BODY -o DIR", 0, 0, "", "", npg_synth_options,
-                               false,   npg_verb_synth};
-const npg_verb npg_verbs[] = {{0}};
+static npg_figure figure;
 
-const npg_verb *npg_verb_find(const char *name)
+static npg_status make(const npg_cli *cli)
 {
-    (void)name;
-    return &synth;
+    return npg_synth(cli, &figure);
 }
+
+static const npg_verb synth = {"synth", "--body BODY -o DIR", 0, 0, "", "", npg_synth_options, false, make};
+const npg_verb npg_verbs[] = {{0}};
 
 /* Take --NAME VALUE out of the arguments; NULL when it is not among them. */
 static const char *take(int *argc, char **argv, const char *name)
@@ -217,10 +217,10 @@ int main(int argc, char **argv)
                   {"gone", {open_going, pose_bar, true, -1}}};
     const char *body = take(&argc, argv, "--body"), *change = take(&argc, argv, "--change");
     for (size_t i = 0; body && i < sizeof bodies / sizeof *bodies; i++) {
-        npg_figure figure = bodies[i].figure;
         if (strcmp(bodies[i].name, body) != 0) continue;
+        figure = bodies[i].figure;
         if (change) figure.change = strtoll(change, NULL, 10);
-        int code = npg_synth(argc, argv, &figure);
+        int code = npg_cli_run(&synth, argc, argv);
         if (!code && figure.changes) printf("changes at frame %lld\n", (long long)figure.change);
         return code;
     }

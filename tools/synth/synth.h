@@ -4,6 +4,7 @@
 
 #include "pipeline/memory.h"
 #include "pipeline/mesh.h"
+#include "tools/cli.h"
 
 /* ---- figures: a closed surface and its exact motion ---- */
 
@@ -36,7 +37,7 @@ typedef struct npg_figure {
 extern const npg_figure npg_walker;
 
 /* The verb, of any figure; figure->change is then the frame. */
-int npg_synth(int argc, char **argv, npg_figure *figure);
+npg_status npg_synth(const npg_cli *cli, npg_figure *figure);
 
 /* ---- what figures are made of ---- */
 

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <zlib.h>
 
-enum { PLANES = 4, LEVEL = 9, OUT_STEP = 64 << 10 };
+enum { PLANES = 4, LEVEL = 9 };
 
 npg_status npg_bytes_add(npg_bytes *bytes, const void *data, size_t size)
 {
@@ -72,27 +72,21 @@ static void split_planes(uint8_t *planes, const int32_t *values, size_t count)
     }
 }
 
-/* One call of zlib with what is left of the input; whether it has come to its end. */
-static npg_status deflate_some(npg_bytes *out, z_stream *stream, bool *is_end)
-{
-    NPG_TRY(npg_grow(&out->data, &out->capacity, out->size + OUT_STEP, 1, NPG_FOR_FILES));
-    stream->next_out = out->data + out->size;
-    stream->avail_out = OUT_STEP;
-    int code = deflate(stream, Z_FINISH);
-    out->size += OUT_STEP - stream->avail_out;
-    *is_end = code == Z_STREAM_END;
-    return code == Z_OK || code == Z_STREAM_END ? NPG_OK : npg_error(NPG_FAILED, "zlib: code %d", code);
-}
-
 static npg_status deflate_all(npg_bytes *out, uint8_t *bytes, size_t size)
 {
     z_stream stream = {.next_in = bytes, .avail_in = (uInt)size};
-    bool is_end = false;
     if (size > UINT32_MAX / 2) return npg_error(NPG_USAGE, "a block of %zu bytes is too large", size);
     if (deflateInit2(&stream, LEVEL, Z_DEFLATED, 15, 9, Z_FILTERED) != Z_OK)
         return npg_error(NPG_MEMORY, "no memory to compress");
-    npg_status status = NPG_OK;
-    while (!status && !is_end) status = deflate_some(out, &stream, &is_end);
+    size_t most = deflateBound(&stream, (uLong)size);
+    npg_status status = npg_grow(&out->data, &out->capacity, out->size + most, 1, NPG_FOR_FILES);
+    if (!status) {
+        stream.next_out = out->data + out->size;
+        stream.avail_out = (uInt)most;
+        if (deflate(&stream, Z_FINISH) != Z_STREAM_END)
+            status = npg_error(NPG_FAILED, "zlib: %s", stream.msg);
+        out->size += stream.total_out;
+    }
     deflateEnd(&stream);
     return status;
 }

@@ -1,5 +1,4 @@
 /* Facts: what a page knows of a result beside meshes and points, as JSON. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "pipeline/json_file.h"
@@ -7,22 +6,6 @@
 #include "tools/view/view_internal.h"
 
 enum { WARNINGS_MAX = 50 };
-
-static const json_t *options_of(const npg_view_part *part)
-{
-    return json_object_get(part->done ? part->done : part->job, "options");
-}
-
-static const json_t *stage_of(const npg_view_part *part, const char *name)
-{
-    return json_object_get(json_object_get(part->report, "stages"), name);
-}
-
-static double option_number(const npg_view_part *part, const char *name, double otherwise)
-{
-    const char *text = json_string_value(json_object_get(options_of(part), name));
-    return text ? strtod(text, NULL) : otherwise;
-}
 
 /* ---- frames ---- */
 
@@ -70,8 +53,9 @@ static json_t *json_of_windows(const npg_view_part *part)
 {
     json_t *windows = json_array();
     npg_plan plan = {.frame_count = frames_in_all(part), .key = key_of(part)};
-    plan.window = npg_plan_window_asked((int64_t)option_number(part, "window", 0), plan.frame_count);
-    plan.overlap = (int64_t)option_number(part, "overlap", 0);
+    plan.window = npg_plan_window_asked((int64_t)npg_view_number(npg_view_run_options(part), "window", 0),
+                                        plan.frame_count);
+    plan.overlap = (int64_t)npg_view_number(npg_view_run_options(part), "overlap", 0);
     if (plan.window <= 0 || plan.window > plan.frame_count) plan.window = plan.frame_count;
     if (plan.overlap >= plan.window) plan.overlap = plan.window - 1;
     if (plan.key < 0 || plan.frame_count > 1000000 || plan.overlap < 0) return windows;
@@ -87,13 +71,14 @@ static json_t *json_of_windows(const npg_view_part *part)
 static json_t *json_of_part(const npg_view_part *part)
 {
     const npg_mesh *mesh = part->reference;
-    json_t *topology = json_object_get(stage_of(part, "evaluate"), "topology");
-    json_t *out = json_pack("{so sI sI sI sI sf sf sf so so}", "label", npg_json_text(part->label),
-                            "vertices", (json_int_t)(mesh ? mesh->vert_count : 0), "faces",
-                            (json_int_t)(mesh ? mesh->face_count : 0), "group", (json_int_t)part->group,
-                            "frame_count", (json_int_t)frames_in_all(part), "diagonal", part->diagonal,
-                            "cover", part->cover_share, "bar", option_number(part, "bars.residual", 0.5),
-                            "windows", json_of_windows(part), "frames", json_of_frames(part));
+    json_t *topology = npg_json_at(part->report, "stages.evaluate.topology");
+    json_t *out =
+        json_pack("{so sI sI sI sI sf sf sf so so}", "label", npg_json_text(part->label), "vertices",
+                  (json_int_t)(mesh ? mesh->vert_count : 0), "faces",
+                  (json_int_t)(mesh ? mesh->face_count : 0), "group", (json_int_t)part->group, "frame_count",
+                  (json_int_t)frames_in_all(part), "diagonal", part->diagonal, "cover", part->cover_share,
+                  "bar", npg_view_number(npg_view_run_options(part), "bars.residual", 0.5), "windows",
+                  json_of_windows(part), "frames", json_of_frames(part));
     if (!out) return NULL;
     if (part->origin.known)
         json_object_set_new(
@@ -118,8 +103,8 @@ json_t *npg_view_result_json(const npg_view_result *result)
 {
     const npg_view_part *first = &result->parts[0];
     const json_t *done = first->done;
-    const char *up = json_string_value(json_object_get(options_of(first), "up"));
-    double fps = option_number(first, "fps", 30);
+    const char *up = json_string_value(json_object_get(npg_view_run_options(first), "up"));
+    double fps = npg_view_number(npg_view_run_options(first), "fps", 30);
     json_t *parts = json_array(), *warnings = json_array();
     for (size_t i = 0; i < result->part_count; i++) {
         json_array_append_new(parts, json_of_part(&result->parts[i]));

@@ -94,6 +94,12 @@ typedef struct npg_view_result {
 npg_status npg_view_result_open(npg_view_result *result, const char *path, int64_t every, bool may_be_empty);
 void npg_view_result_close(npg_view_result *result);
 
+/* The options it was run with, texts by name; NULL: not known. */
+const json_t *npg_view_run_options(const npg_view_part *part);
+
+/* A number, or a text of one, of an object. */
+double npg_view_number(const json_t *object, const char *key, double otherwise);
+
 /* What the page knows of it beside meshes and points; a new reference, NULL: no memory (view_facts.c). */
 json_t *npg_view_result_json(const npg_view_result *result);
 

@@ -54,68 +54,38 @@ static npg_status open_template(template *page)
     return NPG_OK;
 }
 
-/* ---- JSON inside of HTML ---- */
+/* ---- data ---- */
 
-/* JSON text for inside of a script element: ASCII, without "<", "&" and ">"; to be given to free(), NULL: no
- * memory. */
-static char *json_text(const json_t *value)
-{
-    size_t marks = 0;
-    char *text = value ? json_dumps(value, JSON_COMPACT | JSON_ENSURE_ASCII | JSON_REAL_PRECISION(17)) : NULL;
-    if (!text) return NULL;
-    for (const char *c = text; *c; c++) marks += *c == '<' || *c == '>' || *c == '&';
-    char *safe = malloc(strlen(text) + 5 * marks + 1), *out = safe;
-    for (const char *c = text; safe && *c; c++) {
-        if (*c == '<' || *c == '>' || *c == '&')
-            out += sprintf(out, "\\u%04x", (unsigned)*c);
-        else
-            *out++ = *c;
-    }
-    if (safe) *out = 0;
-    free(text);
-    return safe;
-}
-
+/* JSON as text for inside of a script element: ASCII, without "<", "&" and ">". */
 static npg_status write_json(npg_file *file, json_t *results, bool is_live)
 {
     json_t *page =
         json_pack("{si ss sb so}", "format", 1, "neupig", npg_version(), "live", is_live, "results", results);
-    char *text = json_text(page);
+    char *text = page ? json_dumps(page, JSON_COMPACT | JSON_ENSURE_ASCII | JSON_REAL_PRECISION(17)) : NULL;
     json_decref(page);
     if (!text) return npg_error(NPG_MEMORY, "no memory for the page");
     npg_file_print(file, "<script type=\"application/json\" id=\"facts\">");
-    npg_file_write(file, text, strlen(text));
+    for (const char *c = text; *c;) {
+        size_t plain = strcspn(c, "<>&");
+        npg_file_write(file, c, plain);
+        c += plain;
+        if (*c) npg_file_print(file, "\\u%04x", (unsigned)*c++);
+    }
     npg_file_print(file, "</script>\n");
     free(text);
     return NPG_OK;
 }
 
-/* ---- blocks ---- */
-
-enum { BYTES_AT_ONCE = 3072 }; /* a multiple of 3 */
-
-static void write_some(npg_file *file, const unsigned char *bytes, size_t size)
+static void write_base64(npg_file *file, const uint8_t *bytes, size_t size)
 {
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    char text[BYTES_AT_ONCE / 3 * 4];
-    size_t length = 0;
     for (size_t i = 0; i < size; i += 3) {
-        uint32_t left = (uint32_t)(size - i), three = (uint32_t)bytes[i] << 16;
-        if (left > 1) three |= (uint32_t)bytes[i + 1] << 8;
-        if (left > 2) three |= bytes[i + 2];
-        text[length++] = digits[three >> 18];
-        text[length++] = digits[three >> 12 & 63];
-        text[length++] = left > 1 ? digits[three >> 6 & 63] : '=';
-        text[length++] = left > 2 ? digits[three & 63] : '=';
-    }
-    npg_file_write(file, text, length);
-}
-
-static void write_base64(npg_file *file, const void *bytes, size_t size)
-{
-    for (size_t at = 0; at < size; at += BYTES_AT_ONCE) {
-        size_t left = size - at;
-        write_some(file, (const unsigned char *)bytes + at, left < BYTES_AT_ONCE ? left : BYTES_AT_ONCE);
+        size_t left = size - i;
+        uint32_t three = (uint32_t)bytes[i] << 16 | (left > 1 ? (uint32_t)bytes[i + 1] << 8 : 0) |
+                         (left > 2 ? bytes[i + 2] : 0);
+        const char four[4] = {digits[three >> 18], digits[three >> 12 & 63],
+                              left > 1 ? digits[three >> 6 & 63] : '=', left > 2 ? digits[three & 63] : '='};
+        npg_file_write(file, four, sizeof four);
     }
 }
 

@@ -107,7 +107,12 @@ static npg_status read_reference(npg_arena *arena, npg_view_part *part, bool may
 
 /* ---- what the run says of itself ---- */
 
-static double number_in(const json_t *object, const char *key, double otherwise)
+const json_t *npg_view_run_options(const npg_view_part *part)
+{
+    return json_object_get(part->done ? part->done : part->job, "options");
+}
+
+double npg_view_number(const json_t *object, const char *key, double otherwise)
 {
     const json_t *value = json_object_get(object, key);
     const char *text = json_string_value(value);
@@ -116,11 +121,10 @@ static double number_in(const json_t *object, const char *key, double otherwise)
 
 static npg_status set_placement(npg_view_part *part)
 {
-    const json_t *axes = json_object_get(part->done, "axes"), *centre = json_object_get(part->done, "centre");
-    const json_t *options = json_object_get(part->job, "options");
-    if (!part->done) axes = json_object_get(options, "axes");
+    const json_t *said = part->done ? part->done : npg_view_run_options(part);
+    const json_t *axes = json_object_get(said, "axes"), *centre = json_object_get(part->done, "centre");
     NPG_TRY(npg_placement_parse(&part->placement, json_is_string(axes) ? json_string_value(axes) : "xyz"));
-    part->placement.scale = number_in(part->done ? part->done : options, "scale", 1);
+    part->placement.scale = npg_view_number(said, "scale", 1);
     for (size_t a = 0; a < 3 && centre; a++)
         part->placement.centre[a] = json_number_value(json_array_get(centre, a));
     return NPG_OK;
@@ -128,17 +132,15 @@ static npg_status set_placement(npg_view_part *part)
 
 static void set_lengths(npg_view_part *part)
 {
-    const json_t *stages = json_object_get(part->report, "stages");
-    const json_t *options = json_object_get(part->done ? part->done : part->job, "options");
-    const json_t *keyframe = json_object_get(stages, "keyframe");
-    double own = number_in(keyframe, "figure_diagonal", number_in(keyframe, "box_diagonal", 0));
+    const json_t *keyframe = npg_json_at(part->report, "stages.keyframe");
+    double own = npg_view_number(keyframe, "figure_diagonal", npg_view_number(keyframe, "box_diagonal", 0));
     npg_bounds bounds = npg_bounds_empty();
     if (part->reference)
         npg_bounds_add_points(&bounds, part->reference->vert_pos, part->reference->vert_count);
     part->diagonal = part->placement.scale * own;
     if (!(part->diagonal > 0) && part->reference) part->diagonal = npg_bounds_diagonal(&bounds);
     if (!(part->diagonal > 0) || !isfinite(part->diagonal)) part->diagonal = 1;
-    part->cover_share = 0.01 * number_in(options, "bars.cover", 1);
+    part->cover_share = 0.01 * npg_view_number(npg_view_run_options(part), "bars.cover", 1);
 }
 
 static npg_status fill_part(npg_arena *arena, npg_view_part *part, int64_t every, bool may_be_empty)
