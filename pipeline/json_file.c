@@ -135,10 +135,15 @@ static npg_status read_lines(FILE *file, const char *path, int64_t bytes, npg_js
     return status;
 }
 
-npg_status npg_json_lines_each(const char *path, int64_t bytes, npg_json_line_visit *visit, void *user)
+npg_status npg_json_lines(const char *folder, const char *name, int64_t bytes, npg_json_line_visit *visit,
+                          void *user)
 {
+    char path[NPG_PATH_SIZE];
+    struct stat info;
     int fd;
+    NPG_TRY(npg_path_of(path, folder, name));
     NPG_TRY(npg_file_open_plain(&fd, path, NPG_DISK));
+    if (bytes < 0) bytes = fstat(fd, &info) ? 0 : (int64_t)info.st_size;
     FILE *file = fdopen(fd, "r");
     npg_status status = file ? read_lines(file, path, bytes, visit, user)
                              : npg_error_errno(NPG_DISK, "can't read back %s", path);
@@ -177,15 +182,6 @@ npg_status npg_file_check(const json_t *entry, const char *output, const char *f
         status = npg_error(NPG_BAD_INPUT, "%s/%s was changed since it was written", output, file);
     json_decref(now);
     return status == NPG_DISK ? NPG_BAD_INPUT : status;
-}
-
-npg_status npg_json_lines_in(const char *folder, const char *name, npg_json_line_visit *visit, void *user)
-{
-    char path[NPG_PATH_SIZE];
-    struct stat info;
-    NPG_TRY(npg_path_of(path, folder, name));
-    if (stat(path, &info)) return npg_error_errno(NPG_DISK, "can't read back %s", path);
-    return npg_json_lines_each(path, (int64_t)info.st_size, visit, user);
 }
 
 npg_status npg_json_load(json_t **value, const char *folder, const char *name, npg_status damaged)

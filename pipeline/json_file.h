@@ -44,12 +44,10 @@ npg_status npg_json_print(npg_file *file, const json_t *value, size_t flags);
  * visit. */
 typedef npg_status npg_json_line_visit(void *user, const json_t *object, const char *line, size_t size);
 
-/* The lines in the first `bytes` bytes of a file.  NPG_DISK when it can't be read, NPG_BAD_INPUT where
- * these are no whole lines with an object each. */
-npg_status npg_json_lines_each(const char *path, int64_t bytes, npg_json_line_visit *visit, void *user);
-
-/* All of the file NAME of a folder; NPG_DISK, too, where it is not there. */
-npg_status npg_json_lines_in(const char *folder, const char *name, npg_json_line_visit *visit, void *user);
+/* The lines in the first `bytes` bytes (-1: all) of a folder's file.  NPG_DISK when it can't be read, NPG_BAD_INPUT
+ * where these are no whole lines with an object each. */
+npg_status npg_json_lines(const char *folder, const char *name, int64_t bytes, npg_json_line_visit *visit,
+                          void *user);
 
 /* ---- what the lists of a run say of a file ---- */
 

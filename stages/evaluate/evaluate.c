@@ -290,7 +290,8 @@ static npg_status restore(npg_worker *worker)
     npg_job *job = npg_job_of(worker);
     int64_t count, bytes;
     npg_job_exported(job, &count, &bytes);
-    return npg_frame_log_each(npg_worker_settings(worker)->output, bytes, restore_line, worker);
+    return npg_json_lines(npg_worker_settings(worker)->output, NPG_FRAME_LOG_NAME, bytes, restore_line,
+                          worker);
 }
 
 /* ---- the stage ---- */

@@ -82,7 +82,7 @@ static npg_status open_job(applying *a)
 {
     char path[NPG_PATH_SIZE];
     NPG_TRY(check_job(a));
-    NPG_TRY(npg_json_lines_in(a->s->job, "frames.jsonl", count_line, a));
+    NPG_TRY(npg_json_lines(a->s->job, "frames.jsonl", -1, count_line, a));
     if (!a->frame_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", a->s->job);
     NPG_TRY(npg_path_of(path, a->s->job, "reference.ply"));
     return npg_read_mesh(&a->reference, path, &a->origin);
@@ -323,7 +323,7 @@ static npg_status apply(applying *a)
     NPG_TRY(open_job(a));
     NPG_TRY(open_carried(a));
     NPG_TRY(open_output(a));
-    NPG_TRY(npg_json_lines_in(a->s->job, "frames.jsonl", visit_frame, a));
+    NPG_TRY(npg_json_lines(a->s->job, "frames.jsonl", -1, visit_frame, a));
     return write_done(a);
 }
 

@@ -61,7 +61,7 @@ static npg_status read_options(npg_worker *worker)
     NPG_TRY(npg_placement_parse(&state->map, state->axes));
     state->map.scale = state->scale;
     NPG_TRY(check_prefix(state->prefix));
-    NPG_TRY(npg_exporters_choose(&state->choice, state->exports, false));
+    NPG_TRY(npg_exporters_choose(&state->choice, state->exports));
     if (reference[0]) format = npg_reader_for(reference);
     state->like = format && !strcmp(format, "obj") ? reference : NULL;
     state->names = (npg_mesh_names){state->prefix, state->choice.is_obj ? "obj" : "ply", 4};
@@ -222,12 +222,6 @@ static npg_status check_exporters(npg_worker *worker)
     return npg_exporters_check(&state->choice, &of_exports);
 }
 
-/* The format vdb has the latent grids of all windows. */
-static bool keeps_grids(const export_state *state)
-{
-    return npg_exporters_name(state->exports, "vdb");
-}
-
 static npg_status prepare_folder(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
@@ -238,7 +232,7 @@ static npg_status prepare_folder(npg_worker *worker)
     NPG_TRY(npg_folder_clear(output));
     NPG_TRY(npg_export_folder(output, "meshes"));
     NPG_TRY(npg_frame_log_open(&state->list, output));
-    return job ? npg_job_write(job, keeps_grids(state)) : NPG_OK;
+    return job ? npg_job_write(job, npg_exporters_has(&state->choice, "vdb")) : NPG_OK;
 }
 
 /* What an earlier run of the same job wrote stays. */
@@ -253,7 +247,7 @@ static npg_status resume_folder(npg_worker *worker)
     NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
     npg_job_exported(job, &count, &bytes);
     NPG_TRY(npg_frame_log_resume(&state->list, output, bytes, &state->mesh_count, &state->skipped_count));
-    return npg_job_write(job, keeps_grids(state));
+    return npg_job_write(job, npg_exporters_has(&state->choice, "vdb"));
 }
 
 static npg_status write_mesh(npg_worker *worker, const char *file, const float *vert_unit,
@@ -333,8 +327,7 @@ static npg_status list_frame(npg_worker *worker, const npg_frame *frame, const c
     export_state *state = npg_worker_state(worker);
     npg_job *job = npg_job_of(worker);
     int64_t lines, bytes;
-    NPG_TRY(npg_frame_log_add(state->list, frame, output_of(worker), file));
-    npg_frame_log_size(state->list, &lines, &bytes);
+    NPG_TRY(npg_frame_log_add(state->list, frame, file, &lines, &bytes));
     if (job) npg_job_set_exported(job, lines, bytes);
     return NPG_OK;
 }
@@ -406,7 +399,7 @@ static npg_status write_exports(npg_worker *worker)
     if (!state->faces) NPG_TRY(begin_meshes(worker));
     npg_export_facts facts = export_facts(worker);
     npg_status status = place_reference(worker, &facts);
-    if (!status && facts.has_pose_colours && npg_exporters_name(state->exports, "glb"))
+    if (!status && facts.has_pose_colours && npg_exporters_has(&state->choice, "glb"))
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "motion.glb has the reference's colours: morph targets of colours are an option of "
                        "glTF that few programs read");

@@ -57,10 +57,10 @@ static npg_status list_files(json_t *files, const char *output, bool has_exports
 {
     static const char *const names[] = {"reference.ply", "frames.jsonl", "report.json"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) NPG_TRY(npg_done_add(files, output, names[i]));
-    NPG_TRY(npg_json_lines_in(output, "frames.jsonl", add_line, files));
+    NPG_TRY(npg_json_lines(output, "frames.jsonl", -1, add_line, files));
     if (!has_exports) return NPG_OK;
     NPG_TRY(npg_done_add(files, output, "exports.jsonl"));
-    return npg_json_lines_in(output, "exports.jsonl", add_line, files);
+    return npg_json_lines(output, "exports.jsonl", -1, add_line, files);
 }
 
 /* The frame log is what an interrupted run is resumed from: it goes when nothing is left to resume. */

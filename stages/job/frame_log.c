@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "pipeline/file.h"
@@ -120,24 +119,18 @@ static json_t *json_of_marks(const npg_figures *f)
 
 static json_t *json_of_frame(const npg_frame *frame, const char *file)
 {
-    json_t *line = json_object();
-    json_object_set_new(line, "index", json_integer((json_int_t)frame->index));
-    json_object_set_new(line, "number", json_integer((json_int_t)frame->number));
-    json_object_set_new(line, "source", npg_json_text(frame->path));
-    json_object_set_new(line, "key", json_boolean(frame->is_key));
-    json_object_set_new(line, "skipped", json_boolean(frame->is_skipped));
-    json_object_set_new(line, "held", json_boolean(frame->is_held));
+    json_t *line = json_pack("{sI sI so sb sb sb}", "index", (json_int_t)frame->index, "number",
+                             (json_int_t)frame->number, "source", npg_json_text(frame->path), "key",
+                             frame->is_key, "skipped", frame->is_skipped, "held", frame->is_held);
     if (frame->is_shared) json_object_set_new(line, "shared", json_true());
     json_object_set_new(line, "points", json_integer((json_int_t)frame->point_count));
     json_object_set_new(line, "cleaning", json_of_cleaning(&frame->cleaning));
-    if (frame->fields & NPG_FIELD_FIGURES) {
-        json_object_set_new(line, "good", json_boolean(frame->figures.good));
-        json_object_set_new(line, "figures", json_of_figures(&frame->figures));
-        json_object_set_new(line, "misfits", json_of_misfits(&frame->figures));
-        json_object_set_new(line, "marks", json_of_marks(&frame->figures));
-        if (frame->figures.fault)
-            json_object_set_new(line, "fault", json_string(fault_names[frame->figures.fault]));
-    }
+    if (frame->fields & NPG_FIELD_FIGURES)
+        json_object_update_new(line, json_pack("{sb so so so ss*}", "good", frame->figures.good, "figures",
+                                               json_of_figures(&frame->figures), "misfits",
+                                               json_of_misfits(&frame->figures), "marks",
+                                               json_of_marks(&frame->figures), "fault",
+                                               fault_names[frame->figures.fault]));
     json_object_set_new(line, "file", npg_json_text(file));
     return line;
 }
@@ -177,19 +170,6 @@ static npg_status add_place(npg_frame_log *list, int64_t index, size_t size)
     return NPG_OK;
 }
 
-static npg_status append(npg_frame_log *list, int64_t index, const char *text, size_t size)
-{
-    if (!npg_write_at(list->fd, text, size, list->size))
-        return npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
-    return add_place(list, index, size);
-}
-
-void npg_frame_log_size(const npg_frame_log *list, int64_t *lines, int64_t *bytes)
-{
-    *lines = (int64_t)list->line_count;
-    *bytes = (int64_t)list->size;
-}
-
 typedef struct resuming {
     npg_frame_log *list;
     int64_t mesh_count, skipped_count;
@@ -213,7 +193,7 @@ npg_status npg_frame_log_resume(npg_frame_log **out, const char *output, int64_t
     resuming r = {0};
     NPG_TRY(open_list(out, output, 0));
     r.list = *out;
-    npg_status status = npg_json_lines_each(r.list->partial_path, bytes, take_line, &r);
+    npg_status status = npg_json_lines(output, NPG_FRAME_LOG_NAME, bytes, take_line, &r);
     if (!status && ftruncate(r.list->fd, (off_t)bytes))
         status = npg_error_errno(NPG_DISK, "can't shorten %s", r.list->partial_path);
     if (status) npg_frame_log_close(out);
@@ -222,19 +202,23 @@ npg_status npg_frame_log_resume(npg_frame_log **out, const char *output, int64_t
     return status;
 }
 
-npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *output,
-                             const char *file)
+npg_status npg_frame_log_add(npg_frame_log *list, const npg_frame *frame, const char *file, int64_t *lines,
+                             int64_t *bytes)
 {
     json_t *line = json_of_frame(frame, file);
-    npg_status status = file ? npg_file_facts(line, output, file) : NPG_OK;
+    npg_status status = file ? npg_file_facts(line, list->output, file) : NPG_OK;
     char *text = status ? NULL : json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(9));
     json_decref(line);
     NPG_TRY(status);
     if (!text) return npg_error(NPG_MEMORY, "no memory for the line of frame %lld", (long long)frame->number);
     size_t size = strlen(text);
     text[size] = '\n'; /* in the place of the final 0: the size goes along */
-    status = append(list, frame->index, text, size + 1);
+    if (!npg_write_at(list->fd, text, size + 1, list->size))
+        status = npg_error_errno(NPG_DISK, "can't write %s", list->partial_path);
+    if (!status) status = add_place(list, frame->index, size + 1);
     free(text);
+    *lines = (int64_t)list->line_count;
+    *bytes = (int64_t)list->size;
     return status;
 }
 
@@ -250,25 +234,20 @@ static bool is_unexplained(const npg_facts *facts, int64_t index)
            (facts->has_changed[1] && index <= facts->changed_at[1]);
 }
 
-/* A line, with words that it may have already: the reference does not explain its frame; it has a late fault
+/* A line with what the end of the run has to say: the reference does not explain its frame; it has a late fault
  * (0: none), and so is not good. */
-static npg_status write_line(npg_file *file, char *line, size_t size, bool is_unexplained, int fault)
+static npg_status write_line(npg_file *file, const char *text, size_t size, bool is_unexplained, int fault)
 {
-    static const char good[] = "\"good\":true,";
-    char words[2][64] = {",\"unexplained\":true", ""};
-    char *is_good = fault ? memmem(line, size, good, sizeof good - 1) : NULL;
-    if (size < 2) return npg_file_write(file, line, size);
-    if (is_good) {
-        snprintf(words[1], sizeof words[1], ",\"fault\":\"%s\"", fault_names[fault]);
-        size_t at = (size_t)(is_good - line) + strlen("\"good\":");
-        NPG_TRY(npg_file_write(file, line, at));
-        NPG_TRY(npg_file_print(file, "false"));
-        line += at + strlen("true");
-        size -= at + strlen("true");
+    json_t *line = json_loadb(text, size, 0, NULL);
+    if (!line) return npg_error(NPG_FAILED, "a line of the frame log can't be read back");
+    if (is_unexplained) json_object_set_new(line, "unexplained", json_true());
+    if (fault && json_is_true(json_object_get(line, "good"))) {
+        json_object_set_new(line, "good", json_false());
+        json_object_set_new(line, "fault", json_string(fault_names[fault]));
     }
-    bool has = !is_unexplained || memmem(line, size, words[0], strlen(words[0]));
-    NPG_TRY(npg_file_write(file, line, size - 2)); /* without brace and newline */
-    return npg_file_print(file, "%s%s}\n", has ? "" : words[0], words[1]);
+    npg_status status = npg_json_print(file, line, JSON_COMPACT | JSON_REAL_PRECISION(9));
+    json_decref(line);
+    return status ? status : npg_file_write(file, "\n", 1);
 }
 
 static npg_status copy_lines(npg_frame_log *list, npg_file *file, const npg_facts *facts,
@@ -312,15 +291,6 @@ npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts, con
     return npg_file_end(&file, status);
 }
 
-/* ---- the lines of an earlier run ---- */
-
-npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_json_line_visit *visit, void *user)
-{
-    char path[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(path, output, NPG_FRAME_LOG_NAME));
-    return npg_json_lines_each(path, bytes, visit, user);
-}
-
 /* ---- the log that goes with a state ---- */
 
 npg_status npg_frame_log_sync(const char *output, int64_t bytes, uint64_t *hash)
@@ -347,7 +317,7 @@ npg_status npg_frame_log_check(const char *output, int64_t bytes, uint64_t hash)
 
 typedef struct shortened {
     npg_file *file;
-    int64_t below, lines, bytes;
+    int64_t below, lines;
 } shortened;
 
 static npg_status keep_line(void *user, const json_t *frame, const char *line, size_t size)
@@ -355,28 +325,19 @@ static npg_status keep_line(void *user, const json_t *frame, const char *line, s
     shortened *list = user;
     if (json_integer_value(json_object_get(frame, "index")) >= list->below) return NPG_OK;
     list->lines++;
-    list->bytes += (int64_t)size;
     return npg_file_write(list->file, line, size);
-}
-
-static npg_status shorten(const char *from, const char *to, int64_t below, int64_t *lines, int64_t *bytes)
-{
-    struct stat info;
-    shortened list = {.below = below};
-    if (stat(from, &info)) return npg_error_errno(NPG_DISK, "can't read back %s", from);
-    NPG_TRY(npg_file_open(&list.file, to));
-    npg_status status = npg_json_lines_each(from, (int64_t)info.st_size, keep_line, &list);
-    status = npg_file_end(&list.file, status);
-    *lines = list.lines;
-    *bytes = list.bytes;
-    return status;
 }
 
 npg_status npg_frame_log_shorten(const char *output, int64_t below, int64_t *lines, int64_t *bytes)
 {
-    char whole[NPG_PATH_SIZE], partial[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(whole, output, "frames.jsonl"));
-    NPG_TRY(npg_path_of(partial, output, NPG_FRAME_LOG_NAME));
-    NPG_TRY(shorten(npg_is_there(whole) ? whole : partial, partial, below, lines, bytes));
-    return npg_file_remove(output, "frames.jsonl");
+    const char *from = npg_is_in_folder(output, "frames.jsonl") ? "frames.jsonl" : NPG_FRAME_LOG_NAME;
+    shortened list = {.below = below};
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, output, NPG_FRAME_LOG_NAME));
+    NPG_TRY(npg_file_open(&list.file, path));
+    npg_status status = npg_json_lines(output, from, -1, keep_line, &list);
+    *lines = list.lines;
+    *bytes = (int64_t)npg_file_size(list.file);
+    status = npg_file_end(&list.file, status);
+    return status ? status : npg_file_remove(output, "frames.jsonl");
 }

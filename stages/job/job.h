@@ -112,12 +112,9 @@ npg_status npg_frame_log_resume(npg_frame_log **log, const char *output, int64_t
 /* The partial file stays when finish has not been called.  NULL is fine. */
 void npg_frame_log_close(npg_frame_log **log);
 
-/* Append one line for a frame.  file: its mesh relative to OUT, NULL if it has none. */
-npg_status npg_frame_log_add(npg_frame_log *log, const npg_frame *frame, const char *output,
-                             const char *file);
-
-/* Lines so far and their bytes. */
-void npg_frame_log_size(const npg_frame_log *log, int64_t *lines, int64_t *bytes);
+/* Append one line for a frame.  file: its mesh relative to OUT, NULL if it has none.  *lines, *bytes: so far. */
+npg_status npg_frame_log_add(npg_frame_log *log, const npg_frame *frame, const char *file, int64_t *lines,
+                             int64_t *bytes);
 
 /* Faults that only showed when all frames were there, in the order of the indices. */
 typedef struct npg_late_faults {
@@ -138,10 +135,6 @@ extern const npg_fact_kind npg_fact_late_faults;
 npg_status npg_frame_log_finish(npg_frame_log *log, const npg_facts *facts, const npg_late_faults *late);
 
 /* ---- the log of an earlier run ---- */
-
-/* The lines in the first `bytes` bytes of OUT/frames.partial.jsonl.  NPG_DISK, NPG_BAD_INPUT where
- * they are no such lines. */
-npg_status npg_frame_log_each(const char *output, int64_t bytes, npg_json_line_visit *visit, void *user);
 
 /* The figures of a frame that are one number each, as a line has them and a report sums them up. */
 typedef struct npg_figure_row {

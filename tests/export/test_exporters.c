@@ -14,7 +14,6 @@
 #include <sys/wait.h>
 
 #include "export/exporters/exporters_internal.h"
-#include "export/exporters/vdb.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "tests/export/read_surface.h"
@@ -89,7 +88,7 @@ static npg_export_facts facts_of(const char *out)
 static npg_status write_list(const char *list, npg_export_facts *facts, npg_export_watch *watch)
 {
     npg_export_choice choice;
-    NPG_TRY(npg_exporters_choose(&choice, list, false));
+    NPG_TRY(npg_exporters_choose(&choice, list));
     return npg_exporters_write(&choice, facts, watch);
 }
 
@@ -132,19 +131,15 @@ static void the_list_says_what_is_made(void **state)
 {
     npg_export_choice choice;
     (void)state;
-    assert_int_equal(npg_exporters_choose(&choice, "", false), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, ""), NPG_OK);
     assert_false(choice.is_obj);
     assert_false(npg_exporters_any(&choice));
-    assert_int_equal(npg_exporters_choose(&choice, "", true), NPG_OK);
-    assert_true(choice.is_obj);
-    assert_int_equal(npg_exporters_choose(&choice, "obj", false), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "obj"), NPG_OK);
     assert_true(choice.is_obj); /* alone it is the sequence itself */
     assert_false(npg_exporters_any(&choice));
-    assert_int_equal(npg_exporters_choose(&choice, "obj,ply", false), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "obj,ply"), NPG_OK);
     assert_false(choice.is_obj);
     assert_true(npg_exporters_any(&choice));
-    assert_int_equal(npg_exporters_choose(&choice, "ply", true), NPG_OK);
-    assert_true(npg_exporters_any(&choice)); /* format obj and export ply: both */
     json_t *names = npg_exporters_json(&choice);
     assert_int_equal(json_array_size(names), 2);
     json_decref(names);
@@ -156,7 +151,7 @@ static void what_is_no_form_is_refused(void **state)
     npg_export_choice choice;
     (void)state;
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
-        assert_int_equal(npg_exporters_choose(&choice, lists[i], false), NPG_USAGE);
+        assert_int_equal(npg_exporters_choose(&choice, lists[i]), NPG_USAGE);
         assert_non_null(strstr(npg_error_text(), "is none of ply, obj, pc2"));
     }
 }
@@ -167,7 +162,7 @@ static void what_a_form_can_not_hold_is_refused(void **state)
     npg_export_choice choice;
     (void)state;
     facts.pose_count = 10;
-    assert_int_equal(npg_exporters_choose(&choice, "pc2,mdd,glb,usda,npz,vdb", false), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "pc2,mdd,glb,usda,npz,vdb"), NPG_OK);
     assert_int_equal(npg_exporters_check(&choice, &facts), NPG_OK);
     facts.largest = 51; /* more than 16.8 diagonals */
     assert_int_equal(npg_exporters_check(&choice, &facts), NPG_USAGE);
@@ -178,18 +173,14 @@ static void what_a_form_can_not_hold_is_refused(void **state)
     assert_non_null(strstr(npg_error_text(), "frames in 31 bits"));
     facts.pose_count = 10;
     facts.vert_count = (size_t)1 << 31;
-    facts.face_count = 2 * facts.vert_count;
-    const char *const each[] = {"pc2", "mdd", "glb", "usda", "npz"};
-    for (int i = 0; i < 5; i++) {
-        assert_int_equal(npg_exporters_choose(&choice, each[i], false), NPG_OK);
-        assert_int_equal(npg_exporters_check(&choice, &facts), NPG_USAGE);
-        assert_non_null(strstr(npg_error_text(), each[i]));
-    }
+    assert_int_equal(npg_exporters_choose(&choice, "glb"), NPG_OK);
+    assert_int_equal(npg_exporters_check(&choice, &facts), NPG_USAGE);
+    assert_non_null(strstr(npg_error_text(), "glb"));
     facts.pose_count = -1; /* a live source: nothing is known, nothing is refused */
     facts.vert_count = V;
     facts.face_count = F;
     facts.largest = facts.diagonal = 0;
-    assert_int_equal(npg_exporters_choose(&choice, "pc2,mdd,glb,usda,npz,vdb", false), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "pc2,mdd,glb,usda,npz,vdb"), NPG_OK);
     assert_int_equal(npg_exporters_check(&choice, &facts), NPG_OK);
     assert_int_equal(npg_exporters_bytes(&choice, &facts), 0);
 }

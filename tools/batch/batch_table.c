@@ -41,7 +41,7 @@ static npg_status read_folder(figures *f, const npg_capture *capture, const char
 {
     char path[NPG_PATH_SIZE];
     NPG_TRY(npg_path_of(path, capture->output, folder));
-    return npg_is_in_folder(path, "frames.jsonl") ? npg_json_lines_in(path, "frames.jsonl", add_frame, f)
+    return npg_is_in_folder(path, "frames.jsonl") ? npg_json_lines(path, "frames.jsonl", -1, add_frame, f)
                                                   : NPG_OK;
 }
 

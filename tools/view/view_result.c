@@ -77,7 +77,7 @@ static npg_status read_frames(npg_arena *arena, npg_view_part *part, int64_t eve
     char path[NPG_PATH_SIZE];
     NPG_TRY(npg_path_of(path, part->folder, name));
     int64_t size = whole_lines(path);
-    npg_status status = size ? npg_json_lines_each(path, size, add_frame, &r) : NPG_OK;
+    npg_status status = size ? npg_json_lines(part->folder, name, size, add_frame, &r) : NPG_OK;
     if (status == NPG_DISK) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
     if (!status && !part->count && !may_be_empty)
         status = npg_error(NPG_BAD_INPUT, "%s: no frame is solved yet", part->folder);

@@ -40,11 +40,11 @@ static npg_status refuse_name(const char *name, size_t length)
                      name, names);
 }
 
-npg_status npg_exporters_choose(npg_export_choice *choice, const char *list, bool is_obj)
+npg_status npg_exporters_choose(npg_export_choice *choice, const char *list)
 {
     bool has_ply = false;
     int obj = find_exporter("obj", 3);
-    *choice = (npg_export_choice){.is_obj = is_obj};
+    *choice = (npg_export_choice){0};
     for (const char *name = list; *name;) {
         size_t length = strcspn(name, ",");
         int at = find_exporter(name, length);
@@ -55,20 +55,14 @@ npg_status npg_exporters_choose(npg_export_choice *choice, const char *list, boo
         name += length;
         if (*name == ',' && !*++name) return refuse_name(name, 0);
     }
-    choice->is_obj = !has_ply && (is_obj || (obj >= 0 && choice->is_chosen[obj]));
-    if (obj >= 0) choice->is_chosen[obj] = has_ply && (is_obj || choice->is_chosen[obj]);
+    choice->is_obj = !has_ply && choice->is_chosen[obj];
+    choice->is_chosen[obj] = has_ply && choice->is_chosen[obj];
     return NPG_OK;
 }
 
-bool npg_exporters_name(const char *list, const char *name)
+bool npg_exporters_has(const npg_export_choice *choice, const char *name)
 {
-    size_t length = strlen(name);
-    for (; *list; list += *list == ',') {
-        size_t size = strcspn(list, ",");
-        if (size == length && !strncmp(list, name, length)) return true;
-        list += size;
-    }
-    return false;
+    return choice->is_chosen[find_exporter(name, strlen(name))];
 }
 
 bool npg_exporters_any(const npg_export_choice *choice)
@@ -106,10 +100,6 @@ npg_status npg_exporters_check(const npg_export_choice *choice, const npg_export
     for (int i = 0; npg_exporters[i]; i++) {
         if (!choice->is_chosen[i]) continue;
         if (npg_exporters[i]->is_float) NPG_TRY(check_floats(npg_exporters[i], facts));
-        if (npg_exporters[i]->is_indexed && facts->vert_count > INT32_MAX)
-            return npg_error(NPG_USAGE,
-                             "%s can't hold the capture: it counts vertices in 31 bits, and there are %zu",
-                             npg_exporters[i]->name, facts->vert_count);
         if (npg_exporters[i]->check) NPG_TRY(npg_exporters[i]->check(facts));
     }
     return NPG_OK;

@@ -60,6 +60,7 @@ typedef struct npg_pose {
     const float *pos;       /* V x 3                       */
     const float *normals;   /* V x 3 or NULL (has_normals) */
     const uint8_t *colours; /* V x 4 or NULL (has_pose_colours) */
+    const char *path;       /* of its own file, of an exporter that has a folder */
 } npg_pose;
 
 /* What every state begins with. */
@@ -71,9 +72,9 @@ typedef struct npg_writer {
 /* An exporter.  state is zeroed but for its npg_writer before open; close is called after open in any case and
  * removes what is not finished. */
 typedef struct npg_exporter {
-    const char *name, *help;
-    const char *file;    /* all poses in one file of this name; NULL: it makes its files itself            */
-    bool is_indexed;     /* counts vertices in 31 bits                                                     */
+    const char *name;
+    const char *file;            /* all poses in one file of this name                                     */
+    const char *folder, *ending; /* or one file a pose, <folder>/<prefix>_<number>.<ending> */
     bool is_float;       /* keeps positions as float: far from 0 that is too coarse                   */
     bool with_reference; /* is of no use without OUT/reference.obj                                        */
     bool has_fixed_rate; /* has no times of its own: a frame without a mesh repeats the one before it */
@@ -81,8 +82,8 @@ typedef struct npg_exporter {
     /* NPG_USAGE when the format can't hold such a capture (vert_count at most, pose_count -1 where unknown).
      * May be NULL. */
     npg_status (*check)(const npg_export_facts *facts);
-    uint64_t (*bytes)(const npg_export_facts *facts); /* on disk, about; pose_count is known */
-    npg_status (*open)(void *state);
+    uint64_t (*bytes)(const npg_export_facts *facts);      /* on disk, about; pose_count is known */
+    npg_status (*open)(void *state);                       /* may be NULL, as those after pose */
     npg_status (*pose)(void *state, const npg_pose *pose); /* in the order of time */
     npg_status (*finish)(void *state);
     void (*close)(void *state);
@@ -98,13 +99,11 @@ typedef struct npg_export_choice {
     bool is_chosen[NPG_EXPORTERS_MAX];
 } npg_export_choice;
 
-/* list: "ply,glb,..." or "".  is_obj: the sequence's format where the list names none; obj beside ply becomes
- * a sequence of its own.  NPG_USAGE names what is no format. */
-npg_status npg_exporters_choose(npg_export_choice *choice, const char *list, bool is_obj);
+/* list: "ply,glb,..." or "".  obj beside ply becomes a sequence of its own.  NPG_USAGE names what is no format. */
+npg_status npg_exporters_choose(npg_export_choice *choice, const char *list);
 
-/* Whether a list that npg_exporters_choose() takes has this name. */
-bool npg_exporters_name(const char *list, const char *name);
-
+/* Whether the format of this name is made of the meshes, and whether any is. */
+bool npg_exporters_has(const npg_export_choice *choice, const char *name);
 bool npg_exporters_any(const npg_export_choice *choice);
 
 /* Names of all that is made, the sequence first; a new array. */
@@ -184,6 +183,20 @@ npg_status npg_write_obj_pose(const char *path, const npg_export_facts *facts, c
 npg_status npg_border_caps(uint32_t **caps, size_t *cap_count, size_t vert_count, const uint32_t *faces,
                            size_t face_count);
 
+/* ---- level sets of surfaces as OpenVDB files (vdb_surface.cpp) ---- */
+
+typedef struct npg_vdb_surface {
+    npg_writer writer;
+    const npg_pose *pose;
+    uint32_t *faces; /* F x 3, closed, owned */
+    size_t face_count;
+} npg_vdb_surface;
+
+/* Write the narrow-band level set (half width three voxels, negative inside) of a pose to a file, as the grid
+ * "surface"; the file's metadata has npg_index, npg_number, npg_fps, npg_metres_per_unit, npg_up.  NPG_FAILED when
+ * nothing of it is inside, so that no surface would come out; NPG_MEMORY. */
+npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *surface);
+
 /* ---- the JSON part of a GLB with one animated mesh ---- */
 
 #define NPG_GLB_POSES 256 /* in one mesh: what WebGL2 holds for sure */
@@ -207,13 +220,8 @@ typedef struct npg_glb_layout {
     float times[NPG_GLB_POSES];               /* seconds from the first pose */
 } npg_glb_layout;
 
-/* Offsets in the binary part. */
-typedef struct npg_glb_places {
-    uint64_t indices, positions, normals, colours, uvs, deltas, times, weights, end;
-    uint64_t delta_size; /* of one pose */
-} npg_glb_places;
-
-npg_glb_places npg_glb_places_of(const npg_glb_layout *layout);
+/* Of the binary part. */
+uint64_t npg_glb_bytes(const npg_glb_layout *layout);
 
 /* The JSON, padded with blanks to *length bytes; 0: to as many as it takes when ranges and times are known,
  * too, so that they can be put in when all is written.  To be given to npg_release(). */

@@ -113,13 +113,33 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
     return NPG_OK;
 }
 
+/* To a writer that has a file for each. */
+static npg_status write_own_file(exporters_pass *p, int i, npg_pose *pose)
+{
+    const npg_export_facts *facts = p->facts;
+    const npg_exporter *exporter = npg_exporters[i];
+    const npg_mesh_names names = {facts->prefix, exporter->ending, facts->width};
+    char name[NPG_MESH_NAME_SIZE], file[NPG_MESH_NAME_SIZE + 16], path[NPG_PATH_SIZE];
+    npg_mesh_name(name, &names, pose->number);
+    snprintf(file, sizeof file, "%s/%s", exporter->folder, name);
+    NPG_TRY(npg_path_of(path, facts->output, file));
+    pose->path = path;
+    NPG_TRY(exporter->pose(p->states[i], pose));
+    return npg_export_made(facts->log, exporter->name, file, pose->index, 1);
+}
+
 static npg_status pass_pose(exporters_pass *p, int64_t index, int64_t number, bool fixed_rate_only)
 {
-    const npg_pose pose = {index, number, p->mesh->vert_pos, p->mesh->vert_normals,
-                           p->facts->has_pose_colours ? p->mesh->vert_colours : NULL};
+    npg_pose pose = {index,
+                     number,
+                     p->mesh->vert_pos,
+                     p->mesh->vert_normals,
+                     p->facts->has_pose_colours ? p->mesh->vert_colours : NULL,
+                     NULL};
     for (int i = 0; npg_exporters[i]; i++)
         if (p->states[i] && (!fixed_rate_only || npg_exporters[i]->has_fixed_rate))
-            NPG_TRY(npg_exporters[i]->pose(p->states[i], &pose));
+            NPG_TRY(npg_exporters[i]->folder ? write_own_file(p, i, &pose)
+                                             : npg_exporters[i]->pose(p->states[i], &pose));
     return NPG_OK;
 }
 
@@ -177,7 +197,8 @@ static npg_status open_writers(exporters_pass *p)
         writer->facts = p->facts;
         if (npg_exporters[i]->file)
             NPG_TRY(npg_export_open(&writer->file, p->facts->output, npg_exporters[i]->file));
-        NPG_TRY(npg_exporters[i]->open(writer));
+        if (npg_exporters[i]->folder) NPG_TRY(npg_export_folder(p->facts->output, npg_exporters[i]->folder));
+        if (npg_exporters[i]->open) NPG_TRY(npg_exporters[i]->open(writer));
     }
     return NPG_OK;
 }
@@ -233,12 +254,12 @@ static npg_status write_exports(exporters_pass *p)
     facts->pose_count = 0;
     p->watch->repeated = 0;
     NPG_TRY(npg_exporters_clear(facts->output));
-    NPG_TRY(npg_json_lines_in(facts->output, "frames.jsonl", count_line, facts));
+    NPG_TRY(npg_json_lines(facts->output, "frames.jsonl", -1, count_line, facts));
     if (!facts->pose_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", facts->output);
     NPG_TRY(npg_exporters_check(p->choice, facts));
     NPG_TRY(open_log(p));
     NPG_TRY(open_writers(p));
-    NPG_TRY(npg_json_lines_in(facts->output, "frames.jsonl", write_line_poses, p));
+    NPG_TRY(npg_json_lines(facts->output, "frames.jsonl", -1, write_line_poses, p));
     return finish_writers(p);
 }
 

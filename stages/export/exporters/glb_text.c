@@ -6,27 +6,34 @@
 #include "export/exporters/exporters_internal.h"
 #include "pipeline/memory.h"
 
-/* Constants of OpenGL that glTF 2.0 uses. */
-enum { ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
-enum { UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126 };
-
 enum { NUMBER_SIZE = 24 }; /* of a float with 17 digits, which bring it back, and the comma */
 
-npg_glb_places npg_glb_places_of(const npg_glb_layout *layout)
+uint64_t npg_glb_bytes(const npg_glb_layout *layout)
 {
     const npg_export_facts *facts = layout->facts;
-    uint64_t g = layout->vert_count, t = layout->pose_count;
-    npg_glb_places at = {.positions = 12 * (uint64_t)facts->face_count,
-                         .delta_size = (facts->has_normals ? 24 : 12) * g};
-    at.normals = at.positions + 12 * g;
-    at.colours = at.normals + (facts->has_normals ? 12 * g : 0);
-    at.uvs = at.colours + (facts->colours ? 8 * g : 0);
-    at.deltas = at.uvs + (layout->has_uvs ? 8 * g : 0);
-    at.times = at.deltas + (t - 1) * at.delta_size;
-    at.weights = at.times + (t > 1 ? 4 * t : 0);
-    at.end = at.weights + 4 * t * (t - 1);
-    return at;
+    uint64_t t = layout->pose_count, row = facts->has_normals ? 24 : 12;
+    uint64_t once = (facts->colours ? 8 : 0) + (layout->has_uvs ? 8 : 0);
+    return 12 * (uint64_t)facts->face_count + layout->vert_count * (t * row + once) + (t > 1 ? 4 * t : 0) +
+           4 * t * (t - 1);
 }
+
+/* What a piece of the binary part holds: constants of OpenGL that glTF 2.0 uses, and the bytes of a row. */
+typedef struct kind {
+    const char *shape;
+    int type, row, target;
+} kind;
+
+enum { UNSIGNED_SHORT = 5123, UNSIGNED_INT = 5125, FLOAT = 5126 };
+enum { ARRAY_BUFFER = 34962, ELEMENT_ARRAY_BUFFER = 34963 };
+static const kind of_indices = {"SCALAR", UNSIGNED_INT, 4, ELEMENT_ARRAY_BUFFER},
+                  of_vectors = {"VEC3", FLOAT, 12, ARRAY_BUFFER},
+                  of_colours = {"VEC4", UNSIGNED_SHORT, 8, ARRAY_BUFFER},
+                  of_uvs = {"VEC2", FLOAT, 8, ARRAY_BUFFER}, of_numbers = {"SCALAR", FLOAT, 4, 0};
+
+typedef struct pieces {
+    json_t *views, *accessors; /* loans */
+    uint64_t end;              /* of the last one */
+} pieces;
 
 /* ---- parts ---- */
 
@@ -41,76 +48,6 @@ static json_t *json_of_node(const npg_export_facts *facts)
     return node;
 }
 
-/* One pose's accessors, the next ones from *next on. */
-static json_t *json_of_pose(int *next, bool has_normals)
-{
-    json_t *pose = json_pack("{si}", "POSITION", (*next)++);
-    if (has_normals) json_object_set_new(pose, "NORMAL", json_integer((*next)++));
-    return pose;
-}
-
-/* The mesh and, where it moves, its animation.  Accessors: indices 0, positions 1, then what there is. */
-static void add_mesh(json_t *root, const npg_glb_layout *layout)
-{
-    const npg_export_facts *facts = layout->facts;
-    int next = 1;
-    json_t *attributes = json_of_pose(&next, facts->has_normals);
-    if (facts->colours) json_object_set_new(attributes, "COLOR_0", json_integer(next++));
-    if (layout->has_uvs) json_object_set_new(attributes, "TEXCOORD_0", json_integer(next++));
-    json_t *part = json_pack("{si si so}", "indices", 0, "material", 0, "attributes", attributes);
-    json_t *mesh = json_pack("{ss s[o]}", "name", "surface", "primitives", part);
-    json_object_set_new(root, "meshes", json_pack("[o]", mesh));
-    if (layout->pose_count < 2) return;
-    json_t *targets = json_array(), *weights = json_array(); /* weights at rest: VTK crashes without */
-    for (size_t t = 1; t < layout->pose_count; t++) {
-        json_array_append_new(targets, json_of_pose(&next, facts->has_normals));
-        json_array_append_new(weights, json_integer(0));
-    }
-    json_object_set_new(part, "targets", targets);
-    json_object_set_new(mesh, "weights", weights);
-    json_object_set_new(root, "animations",
-                        json_pack("[{ss s[{si si ss}] s[{si s{si ss}}]}]", "name", "motion", "samplers",
-                                  "input", next, "output", next + 1, "interpolation", "LINEAR", "channels",
-                                  "sampler", 0, "target", "node", 0, "path", "weights"));
-}
-
-static void add_view(json_t *views, uint64_t from, uint64_t to, int target, int stride)
-{
-    json_t *view = json_pack("{si sI sI}", "buffer", 0, "byteOffset", (json_int_t)from, "byteLength",
-                             (json_int_t)(to - from));
-    if (stride) json_object_set_new(view, "byteStride", json_integer(stride));
-    if (target) json_object_set_new(view, "target", json_integer(target));
-    json_array_append_new(views, view);
-}
-
-static void add_views(json_t *root, const npg_glb_layout *layout)
-{
-    const npg_glb_places at = npg_glb_places_of(layout);
-    const npg_export_facts *facts = layout->facts;
-    bool moves = layout->pose_count > 1;
-    json_t *views = json_array();
-    add_view(views, at.indices, at.positions, ELEMENT_ARRAY_BUFFER, 0);
-    add_view(views, at.positions, at.normals, ARRAY_BUFFER, 12);
-    if (facts->has_normals) add_view(views, at.normals, at.colours, ARRAY_BUFFER, 12);
-    if (facts->colours) add_view(views, at.colours, at.uvs, ARRAY_BUFFER, 8);
-    if (layout->has_uvs) add_view(views, at.uvs, at.deltas, ARRAY_BUFFER, 8);
-    if (moves) add_view(views, at.deltas, at.times, ARRAY_BUFFER, 12);
-    if (moves) add_view(views, at.times, at.weights, 0, 0);
-    if (moves) add_view(views, at.weights, at.end, 0, 0);
-    json_object_set_new(root, "buffers", json_pack("[{sI}]", "byteLength", (json_int_t)at.end));
-    json_object_set_new(root, "bufferViews", views);
-}
-
-/* The new one is a loan. */
-static json_t *add_accessor(json_t *list, int view, uint64_t offset, int type, const char *shape,
-                            uint64_t count)
-{
-    json_t *accessor = json_pack("{si sI si ss sI}", "bufferView", view, "byteOffset", (json_int_t)offset,
-                                 "componentType", type, "type", shape, "count", (json_int_t)count);
-    json_array_append_new(list, accessor);
-    return accessor;
-}
-
 static json_t *json_of_floats(const float *values, int count)
 {
     json_t *out = json_array();
@@ -118,41 +55,74 @@ static json_t *json_of_floats(const float *values, int count)
     return out;
 }
 
-static void set_range(json_t *accessor, const float *lo, const float *hi, int width)
+/* The next piece, of `count` rows, and how far its values reach (NULL: that is not said): its number, as JSON. */
+static json_t *add_piece(pieces *p, const kind *of, uint64_t count, const float *lo, const float *hi)
 {
-    json_object_set_new(accessor, "min", json_of_floats(lo, width));
-    json_object_set_new(accessor, "max", json_of_floats(hi, width));
+    size_t number = json_array_size(p->accessors);
+    json_int_t bytes = (json_int_t)count * of->row;
+    json_t *view =
+        json_pack("{si sI sI}", "buffer", 0, "byteOffset", (json_int_t)p->end, "byteLength", bytes);
+    json_t *accessor = json_pack("{sI si ss sI}", "bufferView", (json_int_t)number, "componentType", of->type,
+                                 "type", of->shape, "count", (json_int_t)count);
+    if (of->target) json_object_set_new(view, "target", json_integer(of->target));
+    if (of->type == UNSIGNED_SHORT) json_object_set_new(accessor, "normalized", json_true());
+    if (lo) json_object_set_new(accessor, "min", json_of_floats(lo, of->row / 4));
+    if (lo) json_object_set_new(accessor, "max", json_of_floats(hi, of->row / 4));
+    json_array_append_new(p->views, view);
+    json_array_append_new(p->accessors, accessor);
+    p->end += (uint64_t)bytes;
+    return json_integer((json_int_t)number);
 }
 
-static void add_motion_accessors(json_t *list, const npg_glb_layout *layout, int view)
+/* The vectors of one pose. */
+static json_t *add_pose(pieces *p, const npg_glb_layout *layout, const npg_glb_range *range)
 {
-    uint64_t g = layout->vert_count, t = layout->pose_count;
-    uint64_t size = npg_glb_places_of(layout).delta_size;
+    json_t *pose = json_object();
+    json_object_set_new(pose, "POSITION",
+                        add_piece(p, &of_vectors, layout->vert_count, range->lo, range->hi));
+    if (layout->facts->has_normals)
+        json_object_set_new(pose, "NORMAL", add_piece(p, &of_vectors, layout->vert_count, NULL, NULL));
+    return pose;
+}
+
+/* Of the mesh that is there, the motion: a morph target for each further pose. */
+static void add_motion(json_t *root, pieces *p, const npg_glb_layout *layout, json_t *mesh, json_t *part)
+{
+    size_t t = layout->pose_count;
+    json_t *targets = json_array(), *weights = json_array(); /* weights at rest: VTK crashes without */
     for (size_t k = 1; k < t; k++) {
-        set_range(add_accessor(list, view, (k - 1) * size, FLOAT, "VEC3", g), layout->delta[k].lo,
-                  layout->delta[k].hi, 3);
-        if (layout->facts->has_normals) add_accessor(list, view, (k - 1) * size + 12 * g, FLOAT, "VEC3", g);
+        json_array_append_new(targets, add_pose(p, layout, &layout->delta[k]));
+        json_array_append_new(weights, json_integer(0));
     }
-    set_range(add_accessor(list, view + 1, 0, FLOAT, "SCALAR", t), &layout->times[0], &layout->times[t - 1],
-              1);
-    add_accessor(list, view + 2, 0, FLOAT, "SCALAR", t * (t - 1));
+    json_object_set_new(part, "targets", targets);
+    json_object_set_new(mesh, "weights", weights);
+    json_t *times = add_piece(p, &of_numbers, t, &layout->times[0], &layout->times[t - 1]);
+    json_t *shares = add_piece(p, &of_numbers, t * (t - 1), NULL, NULL);
+    json_object_set_new(root, "animations",
+                        json_pack("[{ss s[{so so ss}] s[{si s{si ss}}]}]", "name", "motion", "samplers",
+                                  "input", times, "output", shares, "interpolation", "LINEAR", "channels",
+                                  "sampler", 0, "target", "node", 0, "path", "weights"));
 }
 
-static void add_accessors(json_t *root, const npg_glb_layout *layout)
+/* The mesh, where it moves its animation, and what lies where in the binary part. */
+static void add_mesh(json_t *root, const npg_glb_layout *layout)
 {
     const npg_export_facts *facts = layout->facts;
-    uint64_t g = layout->vert_count;
-    int view = 2;
-    json_t *list = json_array();
-    add_accessor(list, 0, 0, UNSIGNED_INT, "SCALAR", 3 * (uint64_t)facts->face_count);
-    set_range(add_accessor(list, 1, 0, FLOAT, "VEC3", g), layout->base.lo, layout->base.hi, 3);
-    if (facts->has_normals) add_accessor(list, view++, 0, FLOAT, "VEC3", g);
+    pieces p = {.views = json_array(), .accessors = json_array()};
+    json_t *indices = add_piece(&p, &of_indices, 3 * (uint64_t)facts->face_count, NULL, NULL);
+    json_t *attributes = add_pose(&p, layout, &layout->base);
     if (facts->colours)
-        json_object_set_new(add_accessor(list, view++, 0, UNSIGNED_SHORT, "VEC4", g), "normalized",
-                            json_true());
-    if (layout->has_uvs) add_accessor(list, view++, 0, FLOAT, "VEC2", g);
-    if (layout->pose_count > 1) add_motion_accessors(list, layout, view);
-    json_object_set_new(root, "accessors", list);
+        json_object_set_new(attributes, "COLOR_0",
+                            add_piece(&p, &of_colours, layout->vert_count, NULL, NULL));
+    if (layout->has_uvs)
+        json_object_set_new(attributes, "TEXCOORD_0", add_piece(&p, &of_uvs, layout->vert_count, NULL, NULL));
+    json_t *part = json_pack("{so si so}", "indices", indices, "material", 0, "attributes", attributes);
+    json_t *mesh = json_pack("{ss s[o]}", "name", "surface", "primitives", part);
+    json_object_set_new(root, "meshes", json_pack("[o]", mesh));
+    if (layout->pose_count > 1) add_motion(root, &p, layout, mesh, part);
+    json_object_set_new(root, "buffers", json_pack("[{sI}]", "byteLength", (json_int_t)p.end));
+    json_object_set_new(root, "bufferViews", p.views);
+    json_object_set_new(root, "accessors", p.accessors);
 }
 
 static json_t *json_of(const npg_glb_layout *layout)
@@ -165,8 +135,6 @@ static json_t *json_of(const npg_glb_layout *layout)
         "scene", 0, "scenes", "nodes", 0, "nodes", json_of_node(layout->facts), "materials", "name",
         "surface", "pbrMetallicRoughness", "metallicFactor", 0, "roughnessFactor", 0.9, "doubleSided", 1);
     add_mesh(root, layout);
-    add_views(root, layout);
-    add_accessors(root, layout);
     return root;
 }
 

@@ -4,7 +4,7 @@
 #include <openvdb/tools/MeshToVolume.h>
 
 extern "C" {
-#include "export/exporters/vdb.h"
+#include "export/exporters/exporters_internal.h"
 }
 #include "geometry/guard.hpp"
 
@@ -15,11 +15,12 @@ constexpr float HALF_WIDTH = 3; // of the narrow band, in voxels: OpenVDB's own 
 
 openvdb::FloatGrid::Ptr make_grid(const npg_vdb_surface &s)
 {
-    std::vector<openvdb::Vec3s> points(s.vert_count);
+    const npg_export_facts &facts = *s.writer.facts;
+    std::vector<openvdb::Vec3s> points(facts.vert_count);
     std::vector<openvdb::Vec3I> triangles(s.face_count);
-    for (size_t i = 0; i < s.vert_count; i++) points[i] = openvdb::Vec3s(s.points + 3 * i);
+    for (size_t i = 0; i < points.size(); i++) points[i] = openvdb::Vec3s(s.pose->pos + 3 * i);
     for (size_t f = 0; f < s.face_count; f++) triangles[f] = openvdb::Vec3I(s.faces + 3 * f);
-    auto transform = openvdb::math::Transform::createLinearTransform(s.voxel);
+    auto transform = openvdb::math::Transform::createLinearTransform(facts.voxel_share * facts.longest);
     auto grid = openvdb::tools::meshToLevelSet<openvdb::FloatGrid>(*transform, points, triangles, HALF_WIDTH);
     grid->setName("surface");
     return grid;
@@ -36,7 +37,7 @@ bool has_inside(const openvdb::FloatGrid &grid)
 
 npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *s)
 {
-    NPG_REQUIRE(path && s && s->voxel > 0);
+    const npg_export_facts &facts = *s->writer.facts;
     return npg::guard("OpenVDB", [&] {
         openvdb::initialize();
         auto grid = make_grid(*s);
@@ -44,14 +45,14 @@ npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *s)
             return npg_error(NPG_FAILED,
                              "OpenVDB: frame %lld: nothing is inside the surface; "
                              "voxels of %g are too large for it",
-                             (long long)s->number, s->voxel);
+                             (long long)s->pose->number, facts.voxel_share * facts.longest);
         openvdb::MetaMap about;
         about.insertMeta("npg_version", openvdb::StringMetadata(npg_version()));
-        about.insertMeta("npg_index", openvdb::Int64Metadata(s->index));
-        about.insertMeta("npg_number", openvdb::Int64Metadata(s->number));
-        about.insertMeta("npg_fps", openvdb::DoubleMetadata(s->fps));
-        about.insertMeta("npg_metres_per_unit", openvdb::DoubleMetadata(s->metres_per_unit));
-        about.insertMeta("npg_up", openvdb::StringMetadata(s->is_z_up ? "z" : "y"));
+        about.insertMeta("npg_index", openvdb::Int64Metadata(s->pose->index));
+        about.insertMeta("npg_number", openvdb::Int64Metadata(s->pose->number));
+        about.insertMeta("npg_fps", openvdb::DoubleMetadata(facts.fps));
+        about.insertMeta("npg_metres_per_unit", openvdb::DoubleMetadata(facts.metres_per_unit));
+        about.insertMeta("npg_up", openvdb::StringMetadata(facts.is_z_up ? "z" : "y"));
         openvdb::io::File file(path);
         file.write(openvdb::GridCPtrVec{grid}, about);
         file.close();

@@ -88,10 +88,8 @@ static void close_cache(void *state)
 }
 
 const npg_exporter npg_exporter_pc2 = {.name = "pc2",
-                                       .help = "PC2 point cache with reference.obj",
                                        .file = "motion.pc2",
                                        .is_float = true,
-                                       .is_indexed = true,
                                        .has_fixed_rate = true,
                                        .with_reference = true,
                                        .state_size = sizeof(cache),
@@ -102,10 +100,8 @@ const npg_exporter npg_exporter_pc2 = {.name = "pc2",
                                        .close = close_cache};
 
 const npg_exporter npg_exporter_mdd = {.name = "mdd",
-                                       .help = "MDD point cache with reference.obj",
                                        .file = "motion.mdd",
                                        .is_float = true,
-                                       .is_indexed = true,
                                        .has_fixed_rate = true,
                                        .with_reference = true,
                                        .state_size = sizeof(cache),

@@ -103,7 +103,7 @@ static uint64_t bytes_of(const npg_export_facts *facts, size_t vert_count, uint6
                              .vert_count = vert_count,
                              .pose_count = poses,
                              .has_uvs = facts->uvs || facts->corner_uvs};
-    return npg_glb_places_of(&layout).end;
+    return npg_glb_bytes(&layout);
 }
 
 static size_t poses_for(const npg_export_facts *facts, size_t vert_count)
@@ -213,7 +213,7 @@ static void write_weights(glb_state *s)
 
 static void put_heads(glb_state *s, unsigned char heads[20])
 {
-    uint64_t binary = npg_glb_places_of(&s->layout).end;
+    uint64_t binary = npg_glb_bytes(&s->layout);
     memcpy(heads, "glTF", 4);
     npg_put_little(heads + 4, 2, 4); /* version */
     npg_put_little(heads + 8, 12 + 8 + s->text_length + 8 + binary, 4);
@@ -245,7 +245,7 @@ static npg_status begin_file(glb_state *s, const npg_pose *pose)
     npg_file_write(s->writer.file, heads, sizeof heads);
     npg_file_write(s->writer.file, text, s->text_length);
     npg_release(&text);
-    npg_put_little(binary_head, npg_glb_places_of(&s->layout).end, 4);
+    npg_put_little(binary_head, npg_glb_bytes(&s->layout), 4);
     npg_file_write(s->writer.file, binary_head, sizeof binary_head);
     write_base(s, pose);
     return NPG_OK;
@@ -310,7 +310,6 @@ static void close_glb(void *state)
 }
 
 const npg_exporter npg_exporter_glb = {.name = "glb",
-                                       .help = "glTF with morph targets",
                                        .is_float = true,
                                        .state_size = sizeof(glb_state),
                                        .check = check_glb,

@@ -306,10 +306,8 @@ static npg_status write_pose(void *state, const npg_pose *pose)
 }
 
 const npg_exporter npg_exporter_npz = {.name = "npz",
-                                       .help = "NumPy arrays with each frame's rigid motion",
                                        .file = "motion.npz",
                                        .is_float = true,
-                                       .is_indexed = true,
                                        .state_size = sizeof(npz_state),
                                        .bytes = bytes,
                                        .open = open_npz,

@@ -1,11 +1,5 @@
 /* OBJ sequence beside a PLY one: OUT/obj/<prefix>_0000.obj. */
-
 #include "export/exporters/exporters_internal.h"
-
-typedef struct obj_state {
-    npg_writer writer;
-    npg_mesh_names names;
-} obj_state;
 
 npg_status npg_write_obj_pose(const char *path, const npg_export_facts *facts, const float *pos,
                               const float *normals, const uint8_t *colours)
@@ -33,27 +27,15 @@ static uint64_t bytes(const npg_export_facts *facts)
     return (uint64_t)facts->pose_count * facts->vert_count * per_vert;
 }
 
-static npg_status open_sequence(void *state)
-{
-    obj_state *s = state;
-    const npg_export_facts *facts = s->writer.facts;
-    s->names = (npg_mesh_names){facts->prefix, "obj", facts->width};
-    return npg_export_folder(facts->output, "obj");
-}
-
 static npg_status write_pose(void *state, const npg_pose *pose)
 {
-    obj_state *s = state;
-    char file[NPG_MESH_NAME_SIZE + 8] = "obj/", path[NPG_PATH_SIZE];
-    npg_mesh_name(file + 4, &s->names, pose->number);
-    NPG_TRY(npg_path_of(path, s->writer.facts->output, file));
-    npg_status status = npg_write_obj_pose(path, s->writer.facts, pose->pos, pose->normals, pose->colours);
-    return status ? status : npg_export_made(s->writer.facts->log, "obj", file, pose->index, 1);
+    return npg_write_obj_pose(pose->path, ((npg_writer *)state)->facts, pose->pos, pose->normals,
+                              pose->colours);
 }
 
 const npg_exporter npg_exporter_obj = {.name = "obj",
-                                       .help = "OBJ sequence",
-                                       .state_size = sizeof(obj_state),
+                                       .folder = "obj",
+                                       .ending = "obj",
+                                       .state_size = sizeof(npg_writer),
                                        .bytes = bytes,
-                                       .open = open_sequence,
                                        .pose = write_pose};

@@ -232,10 +232,8 @@ static void close_usda(void *state)
 }
 
 const npg_exporter npg_exporter_usda = {.name = "usda",
-                                        .help = "USD as text, points as time samples",
                                         .file = "motion.usda",
                                         .is_float = true,
-                                        .is_indexed = true,
                                         .state_size = sizeof(usda_state),
                                         .bytes = bytes,
                                         .open = open_usda,

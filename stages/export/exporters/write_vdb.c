@@ -5,15 +5,7 @@
 #include <string.h>
 
 #include "export/exporters/exporters_internal.h"
-#include "export/exporters/vdb.h"
 #include "job/vdb_file.h"
-
-typedef struct vdb_state {
-    npg_writer writer;
-    npg_mesh_names names;
-    uint32_t *faces; /* with the caps, owned */
-    size_t face_count;
-} vdb_state;
 
 /* A surface of two sides of the box: about six voxels around every one it crosses, stored in blocks of which
  * half are active. */
@@ -34,8 +26,9 @@ static npg_status check(const npg_export_facts *facts)
         NPG_VDB_VOXEL_MIN, voxel, facts->voxel_share, facts->longest, 1.1 * NPG_VDB_VOXEL_MIN / voxel);
 }
 
-static npg_status close_openings(vdb_state *s)
+static npg_status open_vdb(void *state)
 {
+    npg_vdb_surface *s = state;
     const npg_export_facts *facts = s->writer.facts;
     uint32_t *caps;
     size_t cap_count, size = facts->face_count * 3 * sizeof *caps;
@@ -48,15 +41,6 @@ static npg_status close_openings(vdb_state *s)
     return status;
 }
 
-static npg_status open_vdb(void *state)
-{
-    vdb_state *s = state;
-    const npg_export_facts *facts = s->writer.facts;
-    s->names = (npg_mesh_names){facts->prefix, "vdb", facts->width};
-    NPG_TRY(npg_export_folder(facts->output, "volumes"));
-    return close_openings(s);
-}
-
 static npg_status save(void *user, const char *path)
 {
     return npg_vdb_save_surface(path, user);
@@ -64,33 +48,20 @@ static npg_status save(void *user, const char *path)
 
 static npg_status write_pose(void *state, const npg_pose *pose)
 {
-    vdb_state *s = state;
-    const npg_export_facts *facts = s->writer.facts;
-    char file[NPG_MESH_NAME_SIZE + 8] = "volumes/", path[NPG_PATH_SIZE];
-    npg_vdb_surface surface = {.points = pose->pos,
-                               .vert_count = facts->vert_count,
-                               .faces = s->faces,
-                               .face_count = s->face_count,
-                               .voxel = facts->voxel_share * facts->longest,
-                               .index = pose->index,
-                               .number = pose->number,
-                               .fps = facts->fps,
-                               .metres_per_unit = facts->metres_per_unit,
-                               .is_z_up = facts->is_z_up};
-    npg_mesh_name(file + strlen(file), &s->names, pose->number);
-    NPG_TRY(npg_path_of(path, facts->output, file));
-    npg_status status = npg_vdb_file_write(path, NULL, save, &surface);
-    return status ? status : npg_export_made(facts->log, "vdb", file, pose->index, 1);
+    npg_vdb_surface *s = state;
+    s->pose = pose;
+    return npg_vdb_file_write(pose->path, NULL, save, s);
 }
 
 static void close_vdb(void *state)
 {
-    npg_release(&((vdb_state *)state)->faces);
+    npg_release(&((npg_vdb_surface *)state)->faces);
 }
 
 const npg_exporter npg_exporter_vdb = {.name = "vdb",
-                                       .help = "OpenVDB level set per frame",
-                                       .state_size = sizeof(vdb_state),
+                                       .folder = "volumes",
+                                       .ending = "vdb",
+                                       .state_size = sizeof(npg_vdb_surface),
                                        .check = check,
                                        .bytes = bytes,
                                        .open = open_vdb,
