@@ -127,6 +127,12 @@ bool npg_is_in_folder(const char *folder, const char *name)
     return !npg_path_of(path, folder, name) && npg_is_there(path);
 }
 
+bool npg_is_same_file(const char *a, const char *b)
+{
+    struct stat of_a, of_b;
+    return !stat(a, &of_a) && !stat(b, &of_b) && of_a.st_dev == of_b.st_dev && of_a.st_ino == of_b.st_ino;
+}
+
 static npg_status fill_file(npg_file *file, const char *path)
 {
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;

@@ -91,6 +91,9 @@ bool npg_is_there(const char *path);
 bool npg_is_folder(const char *path);
 bool npg_is_in_folder(const char *folder, const char *name);
 
+/* Whether both paths lead to the same file or folder, which is there. */
+bool npg_is_same_file(const char *a, const char *b);
+
 /* ---- whole folders (folder.c) ---- */
 
 /* Call visit(user, name) for each name in a folder that is neither "." nor "..", in no order, until one

@@ -12,8 +12,8 @@ typedef enum ring_state { RING_OPEN, RING_ENDED, RING_ABORTED } ring_state;
 struct npg_ring {
     npg_arena arena; /* of the slots */
     pthread_mutex_t lock;
-    pthread_cond_t changed_full;  /* the producer waits for room   */
-    pthread_cond_t changed_empty; /* the consumer waits for chunks */
+    pthread_cond_t
+        changed; /* one side waits for it at a time: the producer for room, or the consumer for chunks */
     ring_state state;
     size_t capacity, count, first;
     double push_wait_s, pop_wait_s;
@@ -27,8 +27,7 @@ npg_status npg_ring_open(npg_ring **out, size_t capacity)
     NPG_TRY(npg_object_open(&ring, NPG_FOR_RUN, sizeof *ring));
     ring->capacity = capacity;
     pthread_mutex_init(&ring->lock, NULL);
-    pthread_cond_init(&ring->changed_full, NULL);
-    pthread_cond_init(&ring->changed_empty, NULL);
+    pthread_cond_init(&ring->changed, NULL);
     ring->slots = npg_arena_take(&ring->arena, capacity, sizeof *ring->slots);
     npg_status status = npg_arena_status(&ring->arena);
     if (status) npg_ring_close(&ring);
@@ -49,8 +48,7 @@ void npg_ring_close(npg_ring **slot)
     npg_ring *ring = *slot;
     if (!ring) return;
     drop_all(ring);
-    pthread_cond_destroy(&ring->changed_full);
-    pthread_cond_destroy(&ring->changed_empty);
+    pthread_cond_destroy(&ring->changed);
     pthread_mutex_destroy(&ring->lock);
     npg_object_close(slot);
 }
@@ -61,12 +59,12 @@ npg_status npg_ring_push(npg_ring *ring, npg_chunk **chunk)
     pthread_mutex_lock(&ring->lock);
     double since = npg_clock_s();
     while (ring->state == RING_OPEN && ring->count == ring->capacity)
-        pthread_cond_wait(&ring->changed_full, &ring->lock);
+        pthread_cond_wait(&ring->changed, &ring->lock);
     ring->push_wait_s += npg_clock_s() - since;
     if (ring->state == RING_OPEN) {
         ring->slots[(ring->first + ring->count++) % ring->capacity] = *chunk;
         *chunk = NULL;
-        pthread_cond_signal(&ring->changed_empty);
+        pthread_cond_signal(&ring->changed);
     } else {
         status = ring->state == RING_ABORTED ? NPG_ABORTED
                                              : npg_error(NPG_USAGE, "pushed into a ring that has ended");
@@ -80,7 +78,7 @@ npg_status npg_ring_pop(npg_ring *ring, npg_chunk **chunk)
     npg_status status = NPG_OK;
     pthread_mutex_lock(&ring->lock);
     double since = npg_clock_s();
-    while (ring->state == RING_OPEN && !ring->count) pthread_cond_wait(&ring->changed_empty, &ring->lock);
+    while (ring->state == RING_OPEN && !ring->count) pthread_cond_wait(&ring->changed, &ring->lock);
     ring->pop_wait_s += npg_clock_s() - since;
     if (ring->state == RING_ABORTED) {
         status = NPG_ABORTED;
@@ -91,7 +89,7 @@ npg_status npg_ring_pop(npg_ring *ring, npg_chunk **chunk)
         ring->slots[ring->first] = NULL;
         ring->first = (ring->first + 1) % ring->capacity;
         ring->count--;
-        pthread_cond_signal(&ring->changed_full);
+        pthread_cond_signal(&ring->changed);
     }
     pthread_mutex_unlock(&ring->lock);
     return status;
@@ -103,8 +101,7 @@ static void set_end(npg_ring *ring, ring_state state)
     pthread_mutex_lock(&ring->lock);
     if (state == RING_ABORTED || ring->state == RING_OPEN) ring->state = state;
     if (ring->state == RING_ABORTED) drop_all(ring);
-    pthread_cond_broadcast(&ring->changed_full);
-    pthread_cond_broadcast(&ring->changed_empty);
+    pthread_cond_broadcast(&ring->changed);
     pthread_mutex_unlock(&ring->lock);
 }
 

@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "pipeline/clock.h"
@@ -175,10 +174,8 @@ static void note_waits(const npg_worker *worker)
     json_t *r = worker->report;
     push_s += json_real_value(json_object_get(r, "waited_for_next_s"));
     pop_s += json_real_value(json_object_get(r, "waited_for_previous_s"));
-    json_object_set_new(r, "wall_s", json_real(worker->wall_s));
-    json_object_set_new(r, "cpu_s", json_real(worker->cpu_s));
-    json_object_set_new(r, "waited_for_previous_s", json_real(pop_s));
-    json_object_set_new(r, "waited_for_next_s", json_real(push_s));
+    json_object_update_new(r, json_pack("{sf sf sf sf}", "wall_s", worker->wall_s, "cpu_s", worker->cpu_s,
+                                        "waited_for_previous_s", pop_s, "waited_for_next_s", push_s));
 }
 
 /* Somebody outside may be what a stage waits for, or another stage that waits for somebody outside; after a
@@ -317,15 +314,12 @@ static npg_status conclude(npg_run *run)
 {
     json_t *r = run->report;
     warn_of_resident(run);
-    json_object_set_new(r, "status", json_string(run->is_partial ? "partial" : "ok"));
-    json_object_set_new(r, "warning_count", json_integer((json_int_t)run->warning_count));
-    json_object_set_new(r, "exit_code", json_integer(run->is_partial ? 7 : 0));
-    json_t *busy = npg_busy_since(&run->begun);
-    json_object_set_new(r, "cores", json_integer(sysconf(_SC_NPROCESSORS_ONLN)));
-    json_object_update(r, busy);
-    json_decref(busy);
-    json_object_set_new(r, "memory_peak_bytes", json_integer((json_int_t)npg_memory_peak()));
-    json_object_set_new(r, "resident_peak_bytes", json_integer(resident_peak()));
+    json_object_update_new(r, npg_busy_since(&run->begun));
+    json_object_update_new(r, json_pack("{ss sI si si sI sI}", "status", run->is_partial ? "partial" : "ok",
+                                        "warning_count", (json_int_t)run->warning_count, "exit_code",
+                                        run->is_partial ? 7 : 0, "cores", (int)sysconf(_SC_NPROCESSORS_ONLN),
+                                        "memory_peak_bytes", (json_int_t)npg_memory_peak(),
+                                        "resident_peak_bytes", resident_peak()));
     npg_status status = open_worker_states(run);
     for (size_t i = 0; i < run->worker_count && !status; i++)
         if (run->workers[i].stage->conclude) status = run->workers[i].stage->conclude(&run->workers[i]);
@@ -427,30 +421,20 @@ static npg_status open_chain(npg_run *run, const npg_stage *const *chain)
     return check_chain(run);
 }
 
-static bool is_same_folder(const struct stat *a, const char *path)
-{
-    struct stat b;
-    return !stat(path, &b) && a->st_dev == b.st_dev && a->st_ino == b.st_ino;
-}
-
 /* A run that takes its own meshes for frames would never end, and would clear them away first. */
 static npg_status check_followed(const npg_settings *settings)
 {
-    struct stat followed;
-    char *meshes, *folder;
+    char *folder, meshes[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(meshes, settings->output, "meshes"));
     NPG_TRY(npg_copy_text(&folder, settings->follow));
     char *slash = strrchr(folder, '/');
-    if (stat(folder, &followed) && slash) *slash = 0; /* a pattern */
-    bool is_there = !stat(folder, &followed), is_own = false;
+    if (!npg_is_there(folder) && slash) *slash = 0; /* a pattern; ingest says what is not there */
+    bool is_own = settings->output[0] &&
+                  (npg_is_same_file(folder, settings->output) || npg_is_same_file(folder, meshes));
     npg_release(&folder);
-    if (!settings->output[0] || !is_there) return NPG_OK; /* ingest says what is not there */
-    NPG_TRY(npg_join_path(&meshes, settings->output, "meshes"));
-    is_own = is_same_folder(&followed, settings->output) || is_same_folder(&followed, meshes);
-    npg_release(&meshes);
-    if (is_own)
-        return npg_error(NPG_USAGE, "the folder %s that is followed is also where this run writes",
-                         settings->follow);
-    return NPG_OK;
+    if (!is_own) return NPG_OK;
+    return npg_error(NPG_USAGE, "the folder %s that is followed is also where this run writes",
+                     settings->follow);
 }
 
 /* Files, or a live source: standard input, a folder that grows, frames that are pushed. */

@@ -70,44 +70,39 @@ npg_status npg_error_set(npg_status status, const char *text)
     return npg_error(status, "%s", text ? text : "");
 }
 
+static const struct word {
+    npg_status status;
+    int exit_code;
+    const char *name;
+} words[] = {{NPG_OK, 0, "ok"},
+             {NPG_END, 0, "end"},
+             {NPG_STOPPED, 75, "stopped"},
+             {NPG_PARTIAL, 7, "partial"},
+             {NPG_CHANGED, 7, "changed"},
+             {NPG_FAILED, 1, "failed"},
+             {NPG_USAGE, 2, "usage"},
+             {NPG_BAD_INPUT, 3, "bad input"},
+             {NPG_DEVICE, 4, "device"},
+             {NPG_DISK, 5, "disk"},
+             {NPG_MEMORY, 6, "memory"},
+             {NPG_DIVERGED, 1, "diverged"},
+             {NPG_ABORTED, 1, "aborted"}};
+
+static struct word word_of(npg_status status)
+{
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (words[i].status == status) return words[i];
+    return (struct word){status, 1, "unknown"};
+}
+
 int npg_status_exit_code(npg_status status)
 {
-    switch (status) {
-    case NPG_OK:
-    case NPG_END: return 0;
-    case NPG_STOPPED: return 75;
-    case NPG_PARTIAL:
-    case NPG_CHANGED: return 7;
-    case NPG_USAGE: return 2;
-    case NPG_BAD_INPUT: return 3;
-    case NPG_DEVICE: return 4;
-    case NPG_DISK: return 5;
-    case NPG_MEMORY: return 6;
-    case NPG_FAILED:
-    case NPG_DIVERGED:
-    case NPG_ABORTED: break;
-    }
-    return 1;
+    return word_of(status).exit_code;
 }
 
 const char *npg_status_name(npg_status status)
 {
-    switch (status) {
-    case NPG_OK: return "ok";
-    case NPG_END: return "end";
-    case NPG_STOPPED: return "stopped";
-    case NPG_PARTIAL: return "partial";
-    case NPG_CHANGED: return "changed";
-    case NPG_FAILED: return "failed";
-    case NPG_USAGE: return "usage";
-    case NPG_BAD_INPUT: return "bad input";
-    case NPG_DEVICE: return "device";
-    case NPG_DISK: return "disk";
-    case NPG_MEMORY: return "memory";
-    case NPG_DIVERGED: return "diverged";
-    case NPG_ABORTED: return "aborted";
-    }
-    return "unknown";
+    return word_of(status).name;
 }
 
 #define TEXT_OF_(x) #x

@@ -214,9 +214,7 @@ void npg_worker_warn(npg_worker *worker, bool partial, int64_t frame, const char
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     npg_run_log(worker->run, NPG_LOG_WARNING, worker->name, frame, text);
-    json_t *entry = json_object();
-    json_object_set_new(entry, "stage", json_string(worker->name));
-    json_object_set_new(entry, "message", npg_json_text(text));
+    json_t *entry = json_pack("{ss so}", "stage", worker->name, "message", npg_json_text(text));
     if (frame >= 0) json_object_set_new(entry, "frame", json_integer(frame));
     pthread_mutex_lock(&worker->run->lock);
     /* what a resumed run has warned of before it stopped may come again */

@@ -4,50 +4,15 @@
 #include <stdio.h>
 #include <string.h>
 
-const npg_tuning npg_tuning_wide = {.name = "wide",
-                                    .mlp_rows = 192,
-                                    .mlp_vector = 16,
-                                    .mlp_tile_vectors = 2,
-                                    .mlp_tile_rows = 12,
-                                    .mlp_grad_rows = 8,
-                                    .mlp_head_rows = 12,
-                                    .mlp_local = 1,
-                                    .mlp_groups = 2,
-                                    .nearest_queries = 64,
-                                    .frame_local = 1,
-                                    .span = 16,
-                                    .local = 1};
-
+/* clang-format off */
+/* mlp:                                         rows   vector  tile     tile rows   local groups  nearest   frame
+ *                                                             vectors  rows grad head            queries   local span local */
+const npg_tuning npg_tuning_wide   = {"wide",   192,   16,     2,       12,  8,   12,  1,   2,    64,       1,    16,  1};
 /* 16 registers of 8 floats: 6 x 2 sums, 2 vectors of weights, one value. */
-const npg_tuning npg_tuning_narrow = {.name = "narrow",
-                                      .mlp_rows = 192,
-                                      .mlp_vector = 8,
-                                      .mlp_tile_vectors = 2,
-                                      .mlp_tile_rows = 6,
-                                      .mlp_grad_rows = 4,
-                                      .mlp_head_rows = 6,
-                                      .mlp_local = 1,
-                                      .mlp_groups = 2,
-                                      .nearest_queries = 64,
-                                      .frame_local = 1,
-                                      .span = 16,
-                                      .local = 1};
-
-/* 128 items side by side in one row of 512 columns, loads of neighbours adjacent;
- * small blocks give many groups. */
-const npg_tuning npg_tuning_gpu = {.name = "gpu",
-                                   .mlp_rows = 64,
-                                   .mlp_vector = 4,
-                                   .mlp_tile_vectors = 1,
-                                   .mlp_tile_rows = 8,
-                                   .mlp_grad_rows = 8,
-                                   .mlp_head_rows = 1,
-                                   .mlp_local = 128,
-                                   .mlp_groups = 2,
-                                   .nearest_queries = 1,
-                                   .frame_local = 128,
-                                   .span = 1,
-                                   .local = 64};
+const npg_tuning npg_tuning_narrow = {"narrow", 192,   8,      2,       6,   4,   6,   1,   2,    64,       1,    16,  1};
+/* 128 items side by side in one row of 512 columns, loads of neighbours adjacent; small blocks give many groups. */
+const npg_tuning npg_tuning_gpu    = {"gpu",    64,    4,      1,       8,   8,   1,   128, 2,    1,        128,  1,   64};
+/* clang-format on */
 
 void npg_tuning_constants(char *out, size_t size, const npg_tuning *t, const char *program)
 {

@@ -32,13 +32,13 @@ static const struct {
 /* clang-format on */
 
 typedef struct record {
-    int64_t index, number;
+    int64_t index, number, away; /* from the keyframe */
     npg_misfit misfits[NPG_MISFITS];
     double fit; /* median distance of the points, in diagonals */
 } record;
 
 typedef struct side {
-    int64_t next;    /* the index whose turn it is      */
+    int64_t next;    /* how far away the frame is whose turn it is */
     record *waiting; /* came ahead of their turn; owned */
     size_t waiting_count, waiting_room;
     double history[NPG_MISFITS][HISTORY];
@@ -61,12 +61,8 @@ struct npg_alarm {
 
 npg_status npg_alarm_open(npg_alarm **out, int64_t key)
 {
-    npg_alarm *alarm;
-    NPG_TRY(npg_alloc(&alarm, NPG_FOR_RUN, sizeof *alarm));
-    alarm->key = key;
-    alarm->sides[NPG_FORWARD].next = key;
-    alarm->sides[NPG_BACKWARD].next = key;
-    *out = alarm;
+    NPG_TRY(npg_alloc(out, NPG_FOR_RUN, sizeof **out));
+    (*out)->key = key;
     return NPG_OK;
 }
 
@@ -230,16 +226,11 @@ static void process_frame(side *s, const record *r)
 
 /* ---- order ---- */
 
-static int64_t step_of(int direction)
-{
-    return direction == NPG_FORWARD ? 1 : -1;
-}
-
-static void process_waiting(side *s, int direction, bool is_end)
+static void process_waiting(side *s, bool is_end)
 {
     size_t done = 0;
-    while (done < s->waiting_count && (is_end || s->waiting[done].index == s->next)) {
-        s->next = s->waiting[done].index + step_of(direction);
+    while (done < s->waiting_count && (is_end || s->waiting[done].away == s->next)) {
+        s->next = s->waiting[done].away + 1;
         process_frame(s, &s->waiting[done++]);
     }
     s->waiting_count -= done;
@@ -247,30 +238,28 @@ static void process_waiting(side *s, int direction, bool is_end)
 }
 
 /* Those nearest the keyframe come first. */
-static npg_status queue_frame(side *s, int direction, const record *r)
+static npg_status queue_frame(side *s, const record *r)
 {
     NPG_TRY(npg_grow(&s->waiting, &s->waiting_room, s->waiting_count + 1, sizeof *s->waiting, NPG_FOR_RUN));
     size_t at = s->waiting_count++;
-    for (; at > 0 && (s->waiting[at - 1].index - r->index) * step_of(direction) > 0; at--)
-        s->waiting[at] = s->waiting[at - 1];
+    for (; at > 0 && s->waiting[at - 1].away > r->away; at--) s->waiting[at] = s->waiting[at - 1];
     s->waiting[at] = *r;
-    process_waiting(s, direction, false);
+    process_waiting(s, false);
     return NPG_OK;
 }
 
 npg_status npg_alarm_add(npg_alarm *alarm, const npg_frame *frame)
 {
-    record r = {.index = frame->index, .number = frame->number};
+    record r = {.index = frame->index, .number = frame->number, .away = llabs(frame->index - alarm->key)};
     memcpy(r.misfits, frame->figures.misfits, sizeof r.misfits);
     r.fit = (double)(float)frame->figures.point_dist_median; /* as a resumed run reads it back */
-    if (frame->index >= alarm->key) NPG_TRY(queue_frame(&alarm->sides[NPG_FORWARD], NPG_FORWARD, &r));
-    if (frame->index <= alarm->key) NPG_TRY(queue_frame(&alarm->sides[NPG_BACKWARD], NPG_BACKWARD, &r));
-    return NPG_OK;
+    if (frame->index >= alarm->key) NPG_TRY(queue_frame(&alarm->sides[NPG_FORWARD], &r));
+    return frame->index <= alarm->key ? queue_frame(&alarm->sides[NPG_BACKWARD], &r) : NPG_OK;
 }
 
 void npg_alarm_finish(npg_alarm *alarm)
 {
-    for (int d = 0; d < NPG_DIRECTIONS; d++) process_waiting(&alarm->sides[d], d, true);
+    for (int d = 0; d < NPG_DIRECTIONS; d++) process_waiting(&alarm->sides[d], true);
 }
 
 const npg_alarm_cause *npg_alarm_raised(const npg_alarm *alarm, int direction)

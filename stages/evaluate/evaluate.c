@@ -253,10 +253,9 @@ static npg_status flush(npg_worker *worker)
     if (state->bad_count) qsort(state->bad, state->bad_count, sizeof *state->bad, npg_order_int64);
     for (size_t i = 0; i < state->bad_count; i++)
         json_array_append_new(bad, json_integer((json_int_t)state->bad[i]));
-    json_object_set_new(report, "figures", json_of_sums(state));
-    json_object_set_new(report, "good", json_integer((json_int_t)state->good_count));
-    json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
-    json_object_set_new(report, "bad", bad);
+    json_object_update_new(report, json_pack("{so sI sI so}", "figures", json_of_sums(state), "good",
+                                             (json_int_t)state->good_count, "skipped",
+                                             (json_int_t)state->skipped_count, "bad", bad));
     put_into_words(report, state);
     /* A resumed run has not warned itself of those that it restored. */
     if (state->bad_count > (npg_worker_facts(worker)->is_resumed ? 0 : WARNINGS_MAX))

@@ -2,7 +2,6 @@
  * run reports about it. */
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
@@ -88,12 +87,6 @@ static void set_width(export_state *state, const npg_facts *facts)
 
 /* ---- measuring pass: would the names be in each other's or an earlier run's way? ---- */
 
-static bool is_same_file(const char *a, const char *b)
-{
-    struct stat of_a, of_b;
-    return !stat(a, &of_a) && !stat(b, &of_b) && of_a.st_dev == of_b.st_dev && of_a.st_ino == of_b.st_ino;
-}
-
 /* The results must not land among the frames they are made of. */
 static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
 {
@@ -103,7 +96,7 @@ static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
     NPG_TRY(npg_copy_text(&folder, frame->path));
     folder[slash - frame->path] = 0;
     npg_status status = npg_path_of(meshes, output, "meshes");
-    if (!status && is_same_file(folder, meshes))
+    if (!status && npg_is_same_file(folder, meshes))
         status = npg_error(NPG_USAGE,
                            "%s is an input, and this run's meshes would be written over it: "
                            "choose another output folder than %s",
@@ -120,8 +113,7 @@ static npg_status check_reference(const npg_worker *worker)
     for (size_t i = 0; reference[0] && i < sizeof names / sizeof *names; i++) {
         char path[NPG_PATH_SIZE];
         NPG_TRY(npg_path_of(path, output_of(worker), names[i]));
-        bool is_ours = is_same_file(path, reference);
-        if (is_ours)
+        if (npg_is_same_file(path, reference))
             return npg_error(NPG_USAGE,
                              "option reference: %s lies where this run writes: "
                              "copy it, or choose another output folder",
@@ -353,17 +345,13 @@ static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
 
 static void report_settings(json_t *object, const export_state *state)
 {
-    json_object_set_new(object, "format", json_string(state->names.ending));
-    json_object_set_new(object, "scale", json_real(state->scale));
-    json_object_set_new(object, "axes", json_string(state->axes));
-    json_object_set_new(object, "fps", json_real(state->fps));
-    json_object_set_new(object, "up", json_string(state->up ? "z" : "y"));
-    json_object_set_new(object, "metres_per_unit", json_real(metres_per_unit[state->unit]));
-    json_object_set_new(object, "forms", npg_exporters_json(&state->choice));
-    if (state->is_centred)
-        json_object_set_new(
-            object, "centre",
-            json_pack("[fff]", state->map.centre[0], state->map.centre[1], state->map.centre[2]));
+    const double *c = state->map.centre;
+    json_object_update_new(object,
+                           json_pack("{ss sf ss sf ss sf so}", "format", state->names.ending, "scale",
+                                     state->scale, "axes", state->axes, "fps", state->fps, "up",
+                                     state->up ? "z" : "y", "metres_per_unit", metres_per_unit[state->unit],
+                                     "forms", npg_exporters_json(&state->choice)));
+    if (state->is_centred) json_object_set_new(object, "centre", json_pack("[fff]", c[0], c[1], c[2]));
 }
 
 /* ---- the other formats ---- */
@@ -418,8 +406,8 @@ static npg_status close_frames(npg_worker *worker)
     json_t *report = npg_worker_report(worker);
     if (!state->mesh_count) return npg_error(NPG_FAILED, "no frame got a mesh");
     report_settings(report, state);
-    json_object_set_new(report, "meshes", json_integer((json_int_t)state->mesh_count));
-    json_object_set_new(report, "skipped", json_integer((json_int_t)state->skipped_count));
+    json_object_update_new(report, json_pack("{sI sI}", "meshes", (json_int_t)state->mesh_count, "skipped",
+                                             (json_int_t)state->skipped_count));
     NPG_TRY(npg_frame_log_finish(state->list, npg_worker_facts(worker),
                                  npg_worker_fact(worker, &npg_fact_late_faults)));
     return write_exports(worker);

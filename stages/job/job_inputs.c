@@ -108,20 +108,16 @@ static npg_status describe_capture(json_t *frames, const npg_options *options, n
     return status;
 }
 
-/* Options whose value may be a file that the result is made of, besides the reference. */
-static const char *const file_options[] = {"sensor"};
-
-static npg_status describe_option_files(json_t *files, const npg_options *options)
+/* The file that option sensor may name is one that the result is made of, as the reference. */
+static npg_status describe_sensor(json_t *files, const npg_options *options)
 {
-    for (size_t i = 0; i < sizeof file_options / sizeof *file_options; i++) {
-        const char *path = npg_options_get(options, file_options[i]);
-        json_t *file = json_object();
-        npg_status status = path && npg_is_there(path) ? describe_file(file, path) : NPG_OK;
-        if (json_object_size(file)) json_object_set(files, file_options[i], file);
-        json_decref(file);
-        if (status && status != NPG_BAD_INPUT) return status; /* the stage says what is wrong with it */
-    }
-    return NPG_OK;
+    const char *path = npg_options_get(options, "sensor");
+    if (!path || !npg_is_there(path)) return NPG_OK;
+    json_t *file = json_object();
+    npg_status status = describe_file(file, path);
+    if (!status) json_object_set(files, "sensor", file);
+    json_decref(file);
+    return status == NPG_BAD_INPUT ? NPG_OK : status; /* the stage says what is wrong with it */
 }
 
 npg_status npg_job_describe(json_t **out, const npg_options *options)
@@ -134,7 +130,7 @@ npg_status npg_job_describe(json_t **out, const npg_options *options)
     json_t *frames = json_array(), *mesh = json_object(), *files = json_object();
     npg_status status = describe_capture(frames, options, source);
     if (!status && settings.reference[0]) status = describe_file(mesh, settings.reference);
-    if (!status) status = describe_option_files(files, options);
+    if (!status) status = describe_sensor(files, options);
     json_t *description =
         json_pack("{ss si so so so so so so}", "neupig", npg_version(), "layout", LAYOUT, "input",
                   source > NPG_JOB_FOLLOW ? npg_json_text(input) : absolute(input), "options",
@@ -198,14 +194,6 @@ static bool is_same_file(const json_t *then, const json_t *now)
            !strcmp(text_of(then, "xxh3"), text_of(now, "xxh3"));
 }
 
-static npg_status compare_option_files(const json_t *then, const json_t *now)
-{
-    for (size_t i = 0; i < sizeof file_options / sizeof *file_options; i++)
-        if (!is_same_file(json_object_get(then, file_options[i]), json_object_get(now, file_options[i])))
-            return npg_error(NPG_USAGE, "the file of option %s is not the one it was", file_options[i]);
-    return NPG_OK;
-}
-
 static npg_status compare_frames(int64_t *added, const json_t *then, const json_t *now)
 {
     size_t was = json_array_size(then), is = json_array_size(now);
@@ -242,7 +230,8 @@ npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now
         return npg_error(NPG_USAGE, "the stages that the program added are not those that it had");
     if (!is_same_file(json_object_get(then, "reference"), json_object_get(now, "reference")))
         return npg_error(NPG_USAGE, "the reference mesh is not the one it was");
-    NPG_TRY(compare_option_files(json_object_get(then, "files"), json_object_get(now, "files")));
+    if (!is_same_file(npg_json_at(then, "files.sensor"), npg_json_at(now, "files.sensor")))
+        return npg_error(NPG_USAGE, "the file of option sensor is not the one it was");
     return compare_frames(added, json_object_get(then, "frames"), json_object_get(now, "frames"));
 }
 

@@ -162,13 +162,7 @@ npg_status npg_done_write(const char *output, const json_t *head, const json_t *
 /* The same with every file of a run, with has_exports those that OUT/exports.jsonl lists too; the frame log goes. */
 npg_status npg_done_end(const char *output, const json_t *head, bool has_exports);
 
-/* ---- what the OBJ writers share ---- */
-
-/* Digits after the point that keep 1e-7 of the extent, and 9 digits where the extent is unknown. */
-int npg_obj_decimals_for(const npg_mesh_view *mesh);
-
-/* Append " <number>" for each value to a line of `size` bytes, with a decimal point in every locale. */
-void npg_obj_add_numbers(char *line, size_t size, int decimals, const double *values, int count);
+/* ---- OBJ ---- */
 
 /* One pose of a capture (V x 3; normals may be NULL; colours V x 4, NULL: the reference's) as OBJ, with the
  * lines of facts->like where there is one. */
