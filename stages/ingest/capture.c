@@ -13,37 +13,29 @@ static npg_status refuse_gaps(const npg_capture *capture, const char *input)
 }
 
 npg_status npg_capture_open(npg_capture **out, npg_frame_files **list, const char *input, npg_missing missing,
-                            bool keep_going, size_t cache_limit, const char *spill_folder)
+                            bool keep_going, npg_frame_store *store)
 {
-    npg_capture *c;
-    *out = NULL;
-    npg_status status = npg_alloc(&c, NPG_FOR_FILES, sizeof *c);
-    if (status) {
-        npg_frame_files_close(list);
-        return status;
-    }
+    npg_status status = npg_object_open(out, NPG_FOR_FILES, sizeof **out);
+    if (status) npg_frame_files_close(list);
+    NPG_TRY(status);
+    npg_capture *c = *out;
     c->list = *list;
     *list = NULL;
     c->missing = missing;
     c->keep_going = keep_going;
-    status = refuse_gaps(c, input);
-    if (!status) status = npg_alloc(&c->is_bad, NPG_FOR_FILES, c->list->count);
-    if (!status) status = npg_alloc_array(&c->hashes, NPG_FOR_FILES, c->list->count, sizeof *c->hashes);
-    if (!status) status = npg_frame_store_open(&c->store, cache_limit, spill_folder);
-    if (status) npg_capture_close(&c);
-    *out = c;
+    c->store = store;
+    c->is_bad = npg_arena_take(&c->arena, c->list->count, sizeof *c->is_bad);
+    c->hashes = npg_arena_take(&c->arena, c->list->count, sizeof *c->hashes);
+    status = npg_arena_status(&c->arena);
+    if (!status) status = refuse_gaps(c, input);
+    if (status) npg_capture_close(out);
     return status;
 }
 
 void npg_capture_close(npg_capture **slot)
 {
-    npg_capture *c = *slot;
-    if (!c) return;
-    npg_frame_store_close(&c->store);
-    npg_release(&c->is_bad);
-    npg_release(&c->hashes);
-    npg_frame_files_close(&c->list);
-    npg_release(slot);
+    if (*slot) npg_frame_files_close(&(*slot)->list);
+    npg_object_close(slot);
 }
 
 /* A file that somebody exchanges while the run is on would give meshes of two captures.  Asked after it was read, so

@@ -26,8 +26,8 @@ struct npg_follow {
     npg_follow_settings settings;
     char *folder, *pattern, *last; /* owned; pattern may be NULL; last: the name that was taken last */
     const char *ending;            /* of all frames, once one was taken; else NULL */
-    file *files;                   /* files[begin .. count): not taken yet, in natural order; owned */
-    size_t begin, count, capacity;
+    file *files;                   /* not taken yet, in natural order; owned */
+    size_t count, capacity;
     size_t taken_count, late_count;
     size_t number_place; /* which run of digits is the number, from the end of the name */
     int64_t number, step;
@@ -67,16 +67,11 @@ npg_status npg_follow_open(npg_follow **out, const npg_follow_settings *settings
     return status;
 }
 
-static void clear_files(file *files, size_t count)
-{
-    for (size_t i = 0; i < count; i++) npg_release(&files[i].name);
-}
-
 void npg_follow_close(npg_follow **slot)
 {
     npg_follow *follow = *slot;
     if (!follow) return;
-    clear_files(follow->files, follow->count);
+    for (size_t i = 0; i < follow->count; i++) npg_release(&follow->files[i].name);
     npg_release(&follow->files);
     npg_release(&follow->folder);
     npg_release(&follow->pattern);
@@ -201,22 +196,8 @@ static npg_status stat_files(npg_follow *follow)
     return NPG_OK;
 }
 
-static size_t waiting_count(const npg_follow *follow)
-{
-    return follow->count - follow->begin;
-}
-
-static void forget_taken(npg_follow *follow)
-{
-    if (follow->begin)
-        memmove(follow->files, follow->files + follow->begin, waiting_count(follow) * sizeof(file));
-    follow->count -= follow->begin;
-    follow->begin = 0;
-}
-
 static npg_status scan_folder(npg_follow *follow)
 {
-    forget_taken(follow);
     scan s = {.follow = follow, .known = follow->count};
     /* Asked before the names are listed: who writes the end file last has written all frames by then. */
     const char *end_name = follow->settings.end_name;
@@ -234,7 +215,7 @@ static npg_status scan_folder(npg_follow *follow)
 npg_status npg_follow_count_new(npg_follow *follow, size_t *count)
 {
     NPG_TRY(scan_folder(follow));
-    *count = waiting_count(follow);
+    *count = follow->count;
     return NPG_OK;
 }
 
@@ -292,7 +273,7 @@ static bool leaves_numbers_out(const npg_follow *follow, const file *head)
 static bool waits_for_number(npg_follow *follow, const file *head)
 {
     if (!leaves_numbers_out(follow, head)) return false;
-    if (!follow->is_ended && waiting_count(follow) <= NPG_FOLLOW_LATE) return true;
+    if (!follow->is_ended && follow->count <= NPG_FOLLOW_LATE) return true;
     bool was_scanned = follow->gap_before == number_of(follow, head);
     follow->gap_before = number_of(follow, head);
     return !was_scanned;
@@ -310,21 +291,21 @@ static npg_status read_file(npg_follow *follow, const file *head, npg_frame *fra
 /* The head becomes *frame. */
 static npg_status accept_head(npg_follow *follow, npg_frame *frame)
 {
-    file head = follow->files[follow->begin];
+    file head = follow->files[0];
     int64_t number = number_of(follow, &head);
     if (follow->taken_count && number <= follow->number)
         return npg_error(NPG_BAD_INPUT, "%s/%s: has the number %lld, and the frame before it %lld",
                          follow->folder, head.name, (long long)number, (long long)follow->number);
     frame->number = number;
     note_taken(follow, head.name, number);
-    follow->files[follow->begin++].name = NULL;
+    memmove(follow->files, follow->files + 1, --follow->count * sizeof(file));
     return NPG_OK;
 }
 
 /* Whether a file that was refused as it is now will not get better. */
 static bool is_broken(const npg_follow *follow, const file *head)
 {
-    bool has_follower = waiting_count(follow) > 1 || follow->is_ended;
+    bool has_follower = follow->count > 1 || follow->is_ended;
     return has_follower && npg_clock_s() - head->since_s >= follow->settings.settle_s;
 }
 
@@ -333,7 +314,7 @@ static bool is_broken(const npg_follow *follow, const file *head)
 static npg_status try_head(npg_follow *follow, npg_frame *frame, npg_origin *origin, bool *is_taken)
 {
     if (!follow->last) choose_ending_and_number(follow);
-    file *head = &follow->files[follow->begin];
+    file *head = &follow->files[0];
     *is_taken = false;
     if (waits_for_number(follow, head) || !head->is_stable) return NPG_OK;
     bool is_known_bad = head->was_refused && head->refused_size == head->size;
@@ -357,10 +338,10 @@ npg_status npg_follow_next(npg_follow *follow, npg_frame *frame, npg_origin *ori
     bool is_taken = false;
     follow->idle_since_s = npg_clock_s(); /* only time that the run spends waiting here counts as idle */
     for (;;) {
-        npg_status status = waiting_count(follow) ? try_head(follow, frame, origin, &is_taken) : NPG_OK;
+        npg_status status = follow->count ? try_head(follow, frame, origin, &is_taken) : NPG_OK;
         if (status < 0) npg_frame_clear(frame);
         if (status || is_taken) return status;
-        if (follow->is_ended && !waiting_count(follow)) return NPG_END;
+        if (follow->is_ended && !follow->count) return NPG_END;
         NPG_TRY(wait_and_scan(follow));
     }
 }

@@ -57,14 +57,14 @@ static npg_status fill_slots(npg_frame_files *list, const npg_listing *paths, co
     return NPG_OK;
 }
 
-static npg_status number_frames(npg_frame_files *list, npg_listing *paths)
+/* *is_numbered: numbers come from the input, so gaps can be found. */
+static npg_status number_frames(npg_listing *paths, bool *is_numbered)
 {
-    list->is_numbered = true;
+    *is_numbered = true;
     if (paths->numbers) return NPG_OK;
-    paths->numbers = npg_arena_take(&list->arena, paths->count, sizeof *paths->numbers);
-    NPG_TRY(npg_arena_status(&list->arena));
-    return npg_number_paths(paths->numbers, &list->is_numbered, paths->paths, paths->count,
-                            !paths->is_listed);
+    paths->numbers = npg_arena_take(paths->arena, paths->count, sizeof *paths->numbers);
+    NPG_TRY(npg_arena_status(paths->arena));
+    return npg_number_paths(paths->numbers, is_numbered, paths->paths, paths->count, !paths->is_listed);
 }
 
 /* The frames of a rig as if each were a file of its own: its first depth image. */
@@ -86,11 +86,12 @@ static npg_status fill(npg_frame_files *list, const char *input, const npg_selec
                        bool finds_gaps, const npg_rig_settings *rig)
 {
     npg_listing paths = {.arena = &list->arena};
+    bool is_numbered;
     if (rig) NPG_TRY(npg_rig_open(&list->rig, input, rig));
     NPG_TRY(rig ? find_in_rig(&paths, list->rig) : npg_paths_find(&paths, input));
-    NPG_TRY(number_frames(list, &paths));
+    NPG_TRY(number_frames(&paths, &is_numbered));
     list->left_out = paths.left_out;
-    NPG_TRY(fill_slots(list, &paths, selection, finds_gaps && list->is_numbered));
+    NPG_TRY(fill_slots(list, &paths, selection, finds_gaps && is_numbered));
     if (list->count == list->gap_count)
         return npg_error(
             NPG_USAGE, "option frames: chooses none of the %zu frames of %s (numbers %lld to %lld)",

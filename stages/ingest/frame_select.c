@@ -39,23 +39,23 @@ static bool parse_number(int64_t *value, bool *has, const char **at)
 
 static npg_status parse_slice(npg_selection *s, const char *text)
 {
+    bool has_step;
+    int64_t *const parts[] = {&s->first, &s->end, &s->step};
+    bool *const has[] = {&s->has_first, &s->has_end, &has_step};
     const char *at = text;
-    bool has_step = false;
     s->is_slice = true;
     s->step = 1;
-    if (!parse_number(&s->first, &s->has_first, &at)) return refuse(text, "not a number");
-    at = skip_spaces(at);
-    if (*at++ != ':') return refuse(text, "not a number");
-    if (!parse_number(&s->end, &s->has_end, &at)) return refuse(text, "not a number");
-    at = skip_spaces(at);
-    if (*at == ':') {
-        at++;
-        if (!parse_number(&s->step, &has_step, &at)) return refuse(text, "not a number");
+    for (size_t i = 0; i < 3; i++) {
+        if (!parse_number(parts[i], has[i], &at)) return refuse(text, "not a number");
         at = skip_spaces(at);
+        if (i == 0 && *at != ':') return refuse(text, "not a number");
+        if (i < 2 && *at == ':')
+            at++;
+        else
+            break;
     }
     if (*at) return refuse(text, "not of the form a:b:step");
-    if (s->step < 1) return refuse(text, "the step must be at least 1");
-    return NPG_OK;
+    return s->step < 1 ? refuse(text, "the step must be at least 1") : NPG_OK;
 }
 
 static npg_status parse_range(int64_t range[2], const char *text, const char **at)

@@ -26,12 +26,13 @@ struct npg_frame_store {
     size_t disk_bytes, disk_max;
 };
 
-static void release_nothing(void *value)
+static void release_store(void *value)
 {
-    (void)value; /* the capture owns it */
+    npg_frame_store *store = value;
+    npg_frame_store_close(&store);
 }
 
-const npg_fact_kind npg_fact_frame_store = {"frame_store", "ingest", release_nothing};
+const npg_fact_kind npg_fact_frame_store = {"frame_store", "ingest", release_store};
 
 npg_status npg_frame_store_open(npg_frame_store **out, size_t byte_max, const char *spill_folder)
 {

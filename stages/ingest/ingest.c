@@ -72,13 +72,19 @@ static void release_capture(void *thing)
     npg_capture_close(&capture);
 }
 
-static size_t cache_limit(const npg_worker *worker)
+/* For frames that are read again, as a fact. */
+static npg_status open_store(npg_worker *worker, npg_frame_store **store)
 {
+    const npg_settings *settings = npg_worker_settings(worker);
     const state *s = npg_worker_state(worker);
-    size_t limit = (size_t)s->cache_mib << 20,
-           budget = (size_t)npg_worker_settings(worker)->max_memory_mib << 20;
+    size_t limit = (size_t)s->cache_mib << 20, budget = (size_t)settings->max_memory_mib << 20;
+    bool may_spill = settings->output[0] && s->cache_mib;
+    char folder[NPG_PATH_SIZE];
+    if (may_spill) NPG_TRY(npg_path_of(folder, settings->output, "job"));
     /* The cache only saves time: under --max-memory it takes an eighth at most (set by trial). */
-    return budget && limit > budget / 8 ? budget / 8 : limit;
+    if (budget && limit > budget / 8) limit = budget / 8;
+    NPG_TRY(npg_frame_store_open(store, limit, may_spill ? folder : NULL));
+    return npg_worker_publish(worker, &npg_fact_frame_store, *store);
 }
 
 static void report_list(npg_worker *worker, const npg_frame_files *list)
@@ -162,33 +168,20 @@ npg_status npg_capture_list(npg_frame_files **list, const npg_options *options, 
     return list_frames(list, &s, &settings, selection ? selection : s.live.frames);
 }
 
-/* Where frames go that the cache does not hold; *folder is NULL, or the path. */
-static npg_status spill_folder(char path[NPG_PATH_SIZE], const char **folder, const npg_worker *worker)
-{
-    const state *s = npg_worker_state(worker);
-    const npg_settings *settings = npg_worker_settings(worker);
-    *folder = NULL;
-    if (!settings->output[0] || !s->cache_mib) return NPG_OK;
-    *folder = path;
-    return npg_path_of(path, settings->output, "job");
-}
-
 static npg_status open_capture(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_settings *settings = npg_worker_settings(worker);
     npg_capture *capture;
     npg_frame_files *list;
-    char path[NPG_PATH_SIZE];
-    const char *folder;
-    NPG_TRY(spill_folder(path, &folder, worker));
+    npg_frame_store *store;
+    NPG_TRY(open_store(worker, &store));
     NPG_TRY(list_frames(&list, s, settings, s->live.frames));
     NPG_TRY(npg_capture_open(&capture, &list, settings->input, (npg_missing)s->live.missing,
-                             settings->keep_going, cache_limit(worker), folder));
+                             settings->keep_going, store));
     npg_worker_keep(worker, capture, release_capture);
     const uint64_t *hashes = npg_worker_fact(worker, &npg_fact_input_hashes);
     if (hashes) memcpy(capture->hashes, hashes, capture->list->count * sizeof *hashes);
-    NPG_TRY(npg_worker_publish(worker, &npg_fact_frame_store, capture->store));
     /* A resumed run has restored it. */
     if (!npg_worker_facts(worker)->is_resumed)
         *npg_own(worker, frame_count) = *npg_own(worker, planned_count) = (int64_t)capture->list->count;
@@ -292,10 +285,9 @@ static npg_status open_live(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
     npg_live_source *live;
-    char path[NPG_PATH_SIZE];
-    const char *folder;
-    NPG_TRY(spill_folder(path, &folder, worker));
-    NPG_TRY(npg_live_source_open(&live, worker, &s->live, cache_limit(worker), folder));
+    npg_frame_store *store;
+    NPG_TRY(open_store(worker, &store));
+    NPG_TRY(npg_live_source_open(&live, worker, &s->live, store));
     npg_worker_keep(worker, live, release_live);
     return NPG_OK;
 }
@@ -317,8 +309,7 @@ static npg_status next_from_source(npg_worker *worker, npg_chunk *chunk)
     if (!status) npg_chunk_add(chunk, &frame);
     if (status != NPG_END) return status;
     report_cache(worker);
-    if (is_first) NPG_TRY(npg_live_source_plan(live, s->live.look_ahead));
-    return is_last ? npg_live_source_end(live) : NPG_END;
+    return is_first || is_last ? npg_live_source_end(live) : NPG_END;
 }
 
 /* ---- the stage ---- */

@@ -263,9 +263,8 @@ typedef struct npg_frame_files {
     npg_arena arena;         /* of slots and paths                                                */
     size_t count, gap_count; /* slots, and how many of them are gaps                              */
     npg_frame_slot *slots;
-    size_t left_out;  /* files of a folder with another ending that could have been frames */
-    bool is_numbered; /* numbers come from the names, so gaps could be found               */
-    npg_rig *rig;     /* whose frames these are; owned, or NULL for files                  */
+    size_t left_out; /* files of a folder with another ending that could have been frames */
+    npg_rig *rig;    /* whose frames these are; owned, or NULL for files                  */
 } npg_frame_files;
 
 /* finds_gaps false: frames follow each other whatever their numbers are.  settings NULL: the input is no rig; of

@@ -65,8 +65,7 @@ typedef npg_status npg_format_read(npg_builder *builder, npg_source *source);
  * is left there. */
 npg_format_read npg_ply_read, npg_npy_read;
 
-/* .xyzn: columns 4 to 6 are normals whatever their length. */
-npg_format_read npg_obj_read, npg_pcd_read, npg_xyz_read, npg_xyzn_read;
+npg_format_read npg_obj_read, npg_pcd_read, npg_xyz_read;
 
 /* The ending that most of the names have, of those that readers know but `but` (or NULL); how many have it.  Names are
  * texts, or stand first in structs of `size` bytes. */
@@ -160,22 +159,20 @@ typedef enum npg_missing {
 } npg_missing;
 
 typedef struct npg_capture {
+    npg_arena arena;       /* of its arrays */
     npg_frame_files *list; /* owned */
     npg_missing missing;
     bool keep_going;
-    uint8_t *is_bad;        /* per slot: could not be read; owned */
-    uint64_t *hashes;       /* per slot, 0: not known yet; owned  */
-    npg_frame_store *store; /* of what was read; owned            */
-    uint64_t reads;         /* files parsed so far                */
+    uint8_t *is_bad;        /* per slot: could not be read */
+    uint64_t *hashes;       /* per slot, 0: not known yet  */
+    npg_frame_store *store; /* of what was read; a loan    */
+    uint64_t reads;         /* files parsed so far         */
 } npg_capture;
 
 /* Over a list that is at hand; takes it.  NPG_BAD_INPUT with the numbers of the gaps under
- * NPG_MISSING_ERROR; input is for messages.  What was read is kept in cache_limit bytes, and beyond that in
- * spill_folder. */
+ * NPG_MISSING_ERROR; input is for messages. */
 npg_status npg_capture_open(npg_capture **capture, npg_frame_files **list, const char *input,
-                            npg_missing missing, bool keep_going, size_t cache_limit,
-                            const char *spill_folder);
-
+                            npg_missing missing, bool keep_going, npg_frame_store *store);
 void npg_capture_close(npg_capture **capture);
 
 /* Frame `index` (0 <= index < list->count) into the empty *frame.  NPG_USAGE where its file is not the one that it
@@ -258,10 +255,9 @@ typedef struct npg_live_settings {
 
 typedef struct npg_live_source npg_live_source;
 
-/* For the whole run.  Frames that were read and cleaned (npg_fact_frame_store) take cache_bytes, and beyond that a file in spill_folder
- *.  NPG_USAGE, NPG_BAD_INPUT. */
+/* For the whole run; the store is a loan.  NPG_USAGE, NPG_BAD_INPUT. */
 npg_status npg_live_source_open(npg_live_source **live, npg_worker *worker, const npg_live_settings *settings,
-                                size_t cache_bytes, const char *spill_folder);
+                                npg_frame_store *store);
 void npg_live_source_close(npg_live_source **live);
 
 /* Frame `index` into *frame: any of the look-ahead, with is_last_use only once more; in the measuring pass and
@@ -269,10 +265,8 @@ void npg_live_source_close(npg_live_source **live);
  * once a source has ended facts.frame_count says how many there are.  NPG_STOPPED, or what can't be read. */
 npg_status npg_live_source_read(npg_live_source *live, npg_frame *frame, int64_t index, bool is_last_use);
 
-/* End of the measuring pass: facts.planned_count, `most` or as many as there are. */
-npg_status npg_live_source_plan(npg_live_source *live, int64_t most);
-
-/* Solving pass, when all its frames were read: the source's last word. */
+/* When a pass has read its frames.  NPG_END: of the measuring one facts.planned_count is set, the look-ahead or as many
+ * as there are; of the solving one the source has ended. */
 npg_status npg_live_source_end(npg_live_source *live);
 
 /* Probe: what a capture holds, frame by frame and as a whole, and what a run of it would take. */
@@ -292,13 +286,9 @@ typedef struct npg_probe {
 /* Add to the list under "attention": what a run would stumble over, or the user should know. */
 void npg_probe_warn(npg_probe *probe, const char *format, ...) NPG_PRINTF(2, 3);
 
-/* Count a frame that was read with `status`, and clear it.  Bad data goes into the list; any other failure
- * is returned. */
-npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
-                           int64_t number);
-
-/* Read all frames of a list. */
+/* Read all frames of a list, or of standard input. */
 npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list);
+npg_status npg_probe_stream(npg_probe *probe);
 
 /* When all have been read: what only shows then, and what a run with these options would take. */
 void npg_probe_finish(npg_probe *probe, const npg_options *options);

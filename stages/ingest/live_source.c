@@ -21,12 +21,12 @@ struct npg_live_source {
     int64_t seen;                /* frames that came or are missing, chosen or not        */
     npg_frame waiting, previous; /* the frame behind a gap; a copy of the one before it   */
     int64_t gap_left, step;      /* missing frames before the waiting one; their distance */
-    bool is_waiting, is_counted; /* gap_left is known                                     */
+    bool is_waiting;
     int64_t skipped_count;
     npg_frame last;         /* the one that was taken last, until it is read; its index is next - 1 */
     npg_store *spool;       /* of what came; a loan, or ...                                     */
     npg_store *own;         /* ... without a job one that has no name: of the look-ahead        */
-    npg_frame_store *cache; /* of what was read and cleaned; owned                               */
+    npg_frame_store *cache; /* of what was read and cleaned; a loan                              */
     uint64_t key;           /* of the last entry of the spool                                    */
     int64_t *entries;       /* in the spool, of each frame by index, where some are not selected */
     size_t entry_capacity;
@@ -419,10 +419,8 @@ static npg_status step(npg_live_source *live)
         npg_status status = next_frame(live, &live->waiting);
         if (status) return status == NPG_END ? end_live(live) : status;
         live->is_waiting = true;
-        live->is_counted = false;
+        NPG_TRY(count_gap(live, &live->waiting));
     }
-    if (!live->is_counted) NPG_TRY(count_gap(live, &live->waiting));
-    live->is_counted = true;
     return live->gap_left > 0 ? fill_gap(live) : take_waiting(live);
 }
 
@@ -468,18 +466,14 @@ npg_status npg_live_source_read(npg_live_source *live, npg_frame *frame, int64_t
     return status;
 }
 
-npg_status npg_live_source_plan(npg_live_source *live, int64_t most)
-{
-    npg_status status = await(live, most);
-    if (status && status != NPG_END) return status;
-    *npg_own(live->worker, planned_count) = live->next < most ? live->next : most;
-    return NPG_OK;
-}
-
 npg_status npg_live_source_end(npg_live_source *live)
 {
-    npg_status status = step(live);
-    return status ? status : npg_error(NPG_FAILED, "a frame came behind the last one");
+    const bool is_first = npg_worker_pass(live->worker) == NPG_PASS_MEASURE;
+    const int64_t most = live->settings.look_ahead;
+    npg_status status = is_first ? await(live, most) : step(live);
+    if (status && status != NPG_END) return status;
+    if (is_first) *npg_own(live->worker, planned_count) = live->next < most ? live->next : most;
+    return is_first || status ? NPG_END : npg_error(NPG_FAILED, "a frame came behind the last one");
 }
 
 /* ---- the whole ---- */
@@ -500,7 +494,7 @@ static npg_status walk_again(npg_live_source *live)
 }
 
 npg_status npg_live_source_open(npg_live_source **out, npg_worker *worker, const npg_live_settings *settings,
-                                size_t cache_bytes, const char *spill_folder)
+                                npg_frame_store *store)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     npg_live_source *live;
@@ -508,6 +502,7 @@ npg_status npg_live_source_open(npg_live_source **out, npg_worker *worker, const
     NPG_TRY(npg_alloc(&live, NPG_FOR_FILES, sizeof *live));
     live->worker = worker;
     live->settings = *settings;
+    live->cache = store;
     live->total = facts->is_resumed ? facts->frame_count : -1;
     live->spool = npg_worker_fact(worker, &npg_fact_spool);
     npg_status status = NPG_OK;
@@ -515,10 +510,8 @@ npg_status npg_live_source_open(npg_live_source **out, npg_worker *worker, const
         status = npg_store_open_nameless(&live->own, NULL);
         live->spool = live->own;
     }
-    if (!status) status = npg_frame_store_open(&live->cache, cache_bytes, spill_folder);
     if (!status) status = open_source(live);
     if (!status && facts->is_resumed) status = walk_again(live);
-    if (!status) status = npg_worker_publish(worker, &npg_fact_frame_store, live->cache);
     if (status) npg_live_source_close(&live);
     *out = live;
     return status;
@@ -535,7 +528,6 @@ void npg_live_source_close(npg_live_source **slot)
     npg_frame_clear(&live->waiting);
     npg_frame_clear(&live->previous);
     npg_frame_clear(&live->last);
-    npg_frame_store_close(&live->cache);
     npg_store_close(&live->own);
     npg_release(&live->entries);
     npg_release(slot);

@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "pipeline/clock.h"
 #include "pipeline/cost.h"
 
 void npg_probe_warn(npg_probe *probe, const char *format, ...)
@@ -112,8 +113,9 @@ static void add_fault(npg_probe *probe, int64_t number)
                           json_pack("{s:I,s:s}", "number", (json_int_t)number, "error", text));
 }
 
-npg_status npg_probe_count(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
-                           int64_t number)
+/* Count a frame that was read with `status`, and clear it.  Bad data goes into the list; any other failure is returned. */
+static npg_status count_frame(npg_probe *probe, npg_status status, npg_frame *frame, const char *format,
+                              int64_t number)
 {
     if (status == NPG_BAD_INPUT) {
         add_fault(probe, number);
@@ -133,8 +135,27 @@ static npg_status add_bytes(void *user, const char *path)
     return NPG_OK;
 }
 
+npg_status npg_probe_stream(npg_probe *probe)
+{
+    npg_stream *stream;
+    npg_status status = NPG_OK;
+    bool is_broken = false; /* nothing behind it can be found again */
+    double begin_s = npg_clock_s();
+    NPG_TRY(npg_stream_open(&stream, STDIN_FILENO, "standard input", NULL, NULL));
+    for (int64_t number = 0; !status && !is_broken; number++) {
+        npg_frame frame = {0};
+        status = npg_stream_next(stream, &frame, &probe->origin);
+        is_broken = status == NPG_BAD_INPUT;
+        if (status != NPG_END) status = count_frame(probe, status, &frame, "stream", number);
+    }
+    npg_stream_close(&stream);
+    probe->read_s = npg_clock_s() - begin_s;
+    return status == NPG_END ? NPG_OK : status;
+}
+
 npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list)
 {
+    double begin_s = npg_clock_s();
     for (size_t i = 0; i < list->count; i++) {
         const npg_frame_slot *slot = &list->slots[i];
         npg_frame frame = {0};
@@ -142,8 +163,9 @@ npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list)
         const char *format = list->rig ? "rig.json" : npg_reader_for(slot->path);
         NPG_TRY(npg_frame_files_each(list, i, add_bytes, probe->facts));
         npg_status status = npg_frame_files_read(list, i, &frame, &probe->origin);
-        NPG_TRY(npg_probe_count(probe, status, &frame, format ? format : "unknown", slot->number));
+        NPG_TRY(count_frame(probe, status, &frame, format ? format : "unknown", slot->number));
     }
+    probe->read_s = npg_clock_s() - begin_s;
     probe->facts->missing = list->gap_count;
     if (list->gap_count) {
         char gaps[256];

@@ -3,10 +3,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "ingest/ingest_internal.h"
-#include "pipeline/clock.h"
 
 typedef struct job {
     const npg_options *options;
@@ -25,25 +23,6 @@ static bool option_on(const npg_options *options, const char *name)
 }
 
 /* ---- reading ---- */
-
-static npg_status read_stream(job *j)
-{
-    npg_stream *stream;
-    npg_status status = NPG_OK;
-    double begin_s = npg_clock_s();
-    NPG_TRY(npg_stream_open(&stream, STDIN_FILENO, "standard input", NULL, NULL));
-    for (int64_t number = 0; !status; number++) {
-        npg_frame frame = {0};
-        status = npg_stream_next(stream, &frame, &j->probe.origin);
-        if (status == NPG_END) break;
-        bool broken = status == NPG_BAD_INPUT; /* nothing behind it can be found again */
-        status = npg_probe_count(&j->probe, status, &frame, "stream", number);
-        if (broken) break;
-    }
-    npg_stream_close(&stream);
-    j->probe.read_s = npg_clock_s() - begin_s;
-    return status == NPG_END ? NPG_OK : status;
-}
 
 #define APART_MOST    0.004 /* of the depth, between what two sensors see: 1 cm at 2.5 m, more than noise */
 #define OVERLAP_LEAST 0.02
@@ -86,9 +65,7 @@ static npg_status read_files(job *j)
 {
     NPG_TRY(npg_capture_list(&j->list, j->options, NULL));
     NPG_TRY(align_sensors(j));
-    double begin_s = npg_clock_s();
     npg_status status = npg_probe_files(&j->probe, j->list);
-    j->probe.read_s = npg_clock_s() - begin_s;
     if (!status && j->list->rig) status = npg_frame_files_compare(j->list, &j->views);
     if (!status && j->list->rig) warn_of_sensors(j);
     return status;
@@ -96,7 +73,7 @@ static npg_status read_files(job *j)
 
 static npg_status read_all(job *j)
 {
-    npg_status status = strcmp(j->input, "-") ? read_files(j) : read_stream(j);
+    npg_status status = strcmp(j->input, "-") ? read_files(j) : npg_probe_stream(&j->probe);
     if (!status && !j->probe.facts->frames) status = npg_error(NPG_BAD_INPUT, "%s: no frames", j->input);
     return status;
 }

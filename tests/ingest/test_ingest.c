@@ -15,13 +15,22 @@ extern const npg_stage npg_stage_ingest;
 
 /* ---- a stage that writes down what it sees, and plans ---- */
 
+static npg_frame_store *store; /* of the capture that is open */
+
 static npg_status open_capture(npg_capture **capture, const char *path, npg_missing missing, bool keep_going,
-                               size_t limit, const char *spill)
+                               size_t limit)
 {
     npg_frame_files *list;
     *capture = NULL;
-    npg_status status = npg_frame_files_open(&list, path, "", missing != NPG_MISSING_IGNORE, NULL);
-    return status ? status : npg_capture_open(capture, &list, path, missing, keep_going, limit, spill);
+    npg_status status = npg_frame_store_open(&store, limit, NULL);
+    if (!status) status = npg_frame_files_open(&list, path, "", missing != NPG_MISSING_IGNORE, NULL);
+    return status ? status : npg_capture_open(capture, &list, path, missing, keep_going, store);
+}
+
+static void close_capture(npg_capture **capture)
+{
+    npg_capture_close(capture);
+    npg_frame_store_close(&store);
 }
 
 static char seen[3][2048]; /* per pass: "index/number(flags)points@first-x" */
@@ -201,7 +210,7 @@ static void a_file_that_is_exchanged_is_refused_one_that_is_touched_is_not(void 
     const char *path = in_folder(&folder, "exchanged");
     mkdir(path, 0777);
     write_text_file(in_folder(&folder, "exchanged/f0.xyz"), "1 2 3\n");
-    assert_int_equal(open_capture(&capture, path, NPG_MISSING_ERROR, true, 0, NULL), NPG_OK);
+    assert_int_equal(open_capture(&capture, path, NPG_MISSING_ERROR, true, 0), NPG_OK);
     for (int touched = 0; touched < 2; touched++) {
         assert_int_equal(npg_capture_read(capture, &frame, 0, &origin, false), NPG_OK);
         npg_frame_clear(&frame);
@@ -210,12 +219,12 @@ static void a_file_that_is_exchanged_is_refused_one_that_is_touched_is_not(void 
     write_text_file(in_folder(&folder, "exchanged/f0.xyz"), "1 2 4\n");
     assert_int_equal(npg_capture_read(capture, &frame, 0, &origin, false), NPG_USAGE);
     assert_non_null(strstr(npg_error_text(), "f0.xyz was exchanged"));
-    npg_capture_close(&capture);
+    close_capture(&capture);
     /* nor is one that is not what stage job saw */
-    assert_int_equal(open_capture(&capture, path, NPG_MISSING_ERROR, true, 1 << 20, NULL), NPG_OK);
+    assert_int_equal(open_capture(&capture, path, NPG_MISSING_ERROR, true, 1 << 20), NPG_OK);
     capture->hashes[0] = 1;
     assert_int_equal(npg_capture_read(capture, &frame, 0, &origin, false), NPG_USAGE);
-    npg_capture_close(&capture);
+    close_capture(&capture);
 }
 
 static void few_files_are_parsed_twice(void **state)
@@ -227,7 +236,7 @@ static void few_files_are_parsed_twice(void **state)
     for (int limited = 0; limited < 2; limited++) {
         /* Room for the first two frames: 1 + 2 points. */
         size_t limit = limited ? 2 * sizeof(npg_frame) + 3 * 3 * sizeof(float) : 1 << 20;
-        assert_int_equal(open_capture(&capture, path, NPG_MISSING_ERROR, false, limit, NULL), NPG_OK);
+        assert_int_equal(open_capture(&capture, path, NPG_MISSING_ERROR, false, limit), NPG_OK);
         for (int pass = 0; pass < 3; pass++)
             for (int64_t i = 0; i < 4; i++) {
                 npg_frame frame;
@@ -238,7 +247,7 @@ static void few_files_are_parsed_twice(void **state)
                 assert_true(npg_frame_store_used(capture->store).memory_bytes <= limit);
             }
         assert_int_equal(capture->reads, limited ? 4 + 2 + 2 : 4);
-        npg_capture_close(&capture);
+        close_capture(&capture);
     }
 }
 
@@ -335,7 +344,7 @@ static void no_memory_at_any_point(void **state)
         npg_capture *capture;
         npg_origin origin = {0};
         npg_memory_fail_at(n + 1, false);
-        status = open_capture(&capture, path, NPG_MISSING_HOLD, false, 1 << 20, NULL);
+        status = open_capture(&capture, path, NPG_MISSING_HOLD, false, 1 << 20);
         for (int64_t i = 0; !status && i < 4; i++) {
             npg_frame frame;
             status = npg_capture_read(capture, &frame, i, &origin, false);
@@ -343,7 +352,7 @@ static void no_memory_at_any_point(void **state)
         }
         npg_memory_fail_at(0, false);
         if (status) assert_int_equal(status, NPG_MEMORY);
-        npg_capture_close(&capture);
+        close_capture(&capture);
         assert_int_equal(npg_memory_used(), 0);
     }
     assert_true(n > 10);

@@ -2,6 +2,7 @@
  * normals where columns 4 to 6 are. */
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 #include "geometry/geometry.h"
 #include "ingest/ingest_internal.h"
@@ -13,7 +14,7 @@
 typedef struct reader {
     npg_source *source;
     npg_builder *points;
-    bool wants_normals;
+    bool wants_normals;             /* .xyzn: columns 4 to 6 are normals whatever their length */
     int columns;                    /* of the first row, at most COLUMNS_MAX; 0 before it */
     uint64_t claimed_count;         /* .pts: its first line; UINT64_MAX without           */
     uint64_t unit_rows, blank_rows; /* rows whose normal has unit length, or none at all  */
@@ -144,22 +145,14 @@ static npg_status check_count_and_normals(reader *r)
     return NPG_OK;
 }
 
-static npg_status read_as(npg_builder *b, npg_source *source, bool wants_normals)
+npg_status npg_xyz_read(npg_builder *b, npg_source *source)
 {
-    reader r = {.source = source, .points = b, .wants_normals = wants_normals, .claimed_count = UINT64_MAX};
+    const char *dot = strrchr(source->name, '.');
+    reader r = {.source = source, .points = b, .claimed_count = UINT64_MAX};
     size_t rows = 0;
+    r.wants_normals = dot && !strcasecmp(dot, ".xyzn");
     NPG_TRY(npg_source_find_line_end(source));
     if (source->is_seekable) NPG_TRY(count_rows(source, &rows));
     NPG_TRY(read_rows(&r, rows));
     return check_count_and_normals(&r);
-}
-
-npg_status npg_xyz_read(npg_builder *b, npg_source *source)
-{
-    return read_as(b, source, false);
-}
-
-npg_status npg_xyzn_read(npg_builder *b, npg_source *source)
-{
-    return read_as(b, source, true);
 }

@@ -16,7 +16,7 @@ static const struct format {
     [OBJ]  = {".obj",  "obj", npg_obj_read, false},
     [NPY]  = {".npy",  "npy", npg_npy_read, true},
     [XYZ]  = {".xyz",  "xyz", npg_xyz_read,           false},
-    [XYZN] = {".xyzn", "xyz", npg_xyzn_read,          false},
+    [XYZN] = {".xyzn", "xyz", npg_xyz_read,           false},
     [TXT]  = {".txt",  "xyz", npg_xyz_read,           false},
     [PTS]  = {".pts",  "xyz", npg_xyz_read,           false},
     [PCD]  = {".pcd",  "pcd", npg_pcd_read, false}};

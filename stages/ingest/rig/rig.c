@@ -12,7 +12,7 @@
 
 /* ---- what is one ---- */
 
-bool npg_rig_ends_with(const char *name, const char *ending)
+static bool ends_with(const char *name, const char *ending)
 {
     size_t length = strlen(name), size = strlen(ending);
     return length >= size && !strcmp(name + length - size, ending);
@@ -41,11 +41,50 @@ static const char *foreign_layout(const char *folder)
 
 bool npg_rig_is(const char *path)
 {
-    if (!npg_is_folder(path)) return npg_rig_ends_with(path, ".json");
+    if (!npg_is_folder(path)) return ends_with(path, ".json");
     return npg_is_in_folder(path, "rig.json") || foreign_layout(path);
 }
 
 const npg_rig_settings npg_rig_usual = {.step_share = 0.02, .margin = 1};
+
+/* ---- its frames ---- */
+
+static npg_status list_numbers(npg_rig *rig)
+{
+    size_t all = 0, count = 0;
+    for (size_t s = 0; s < rig->sensor_count; s++) all += rig->sensors[s].shot_count;
+    rig->numbers = npg_arena_take(&rig->arena, all + 1, sizeof *rig->numbers);
+    NPG_TRY(npg_arena_status(&rig->arena));
+    for (size_t s = 0; s < rig->sensor_count; s++)
+        for (size_t i = 0; i < rig->sensors[s].shot_count; i++)
+            rig->numbers[count++] = rig->sensors[s].shots[i].number;
+    if (count) qsort(rig->numbers, count, sizeof *rig->numbers, npg_order_int64);
+    for (size_t i = 0; i < count; i++)
+        if (!rig->frame_count || rig->numbers[i] != rig->numbers[rig->frame_count - 1])
+            rig->numbers[rig->frame_count++] = rig->numbers[i];
+    return NPG_OK;
+}
+
+/* Shots are in order of their numbers, which they begin with. */
+static int32_t numbered_shot(const npg_rig_sensor *sensor, int64_t number)
+{
+    const npg_rig_shot *found =
+        bsearch(&number, sensor->shots, sensor->shot_count, sizeof *found, npg_order_int64);
+    return found ? (int32_t)(found - sensor->shots) : -1;
+}
+
+static npg_status join(npg_rig *rig)
+{
+    if (!rig->sensor_count) return npg_error(NPG_BAD_INPUT, "%s: there is no sensor", rig->path);
+    NPG_TRY(list_numbers(rig));
+    if (!rig->frame_count) return npg_error(NPG_BAD_INPUT, "%s: there is no depth image", rig->path);
+    rig->shot_of = npg_arena_take(&rig->arena, rig->frame_count * rig->sensor_count, sizeof *rig->shot_of);
+    NPG_TRY(npg_arena_status(&rig->arena));
+    for (size_t f = 0; f < rig->frame_count; f++)
+        for (size_t s = 0; s < rig->sensor_count; s++)
+            rig->shot_of[f * rig->sensor_count + s] = numbered_shot(&rig->sensors[s], rig->numbers[f]);
+    return NPG_OK;
+}
 
 /* ---- open and close ---- */
 
@@ -73,7 +112,7 @@ static npg_status load(npg_rig *rig, const char *path)
     rig->folder = rig->path ? find_folder(rig) : NULL;
     NPG_TRY(npg_arena_status(&rig->arena));
     NPG_TRY(npg_rig_load_json(rig));
-    return npg_rig_join(rig);
+    return join(rig);
 }
 
 npg_status npg_rig_open(npg_rig **out, const char *path, const npg_rig_settings *settings)
@@ -101,71 +140,7 @@ npg_status npg_rig_path(npg_rig *rig, char **path, const char *name, bool must_b
     return rig->settings.confine && is_there ? npg_path_confine(*path, rig->folder) : NPG_OK;
 }
 
-/* ---- sensors and shots ---- */
-
-npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **out)
-{
-    if (rig->sensor_count >= NPG_RIG_SENSORS_MAX)
-        return npg_error(NPG_BAD_INPUT, "%s: more than %d sensors", rig->path, NPG_RIG_SENSORS_MAX);
-    NPG_TRY(npg_arena_grow(&rig->arena, &rig->sensors, &rig->sensor_capacity, rig->sensor_count + 1,
-                           sizeof *rig->sensors));
-    npg_rig_sensor *sensor = &rig->sensors[rig->sensor_count++];
-    *sensor = (npg_rig_sensor){0};
-    npg_pose_identity(sensor->pose);
-    npg_pose_identity(sensor->depth_to_colour);
-    npg_pose_identity(sensor->correction);
-    *out = sensor;
-    return NPG_OK;
-}
-
-npg_status npg_rig_add_shot(npg_rig *rig, npg_rig_sensor *sensor, const npg_rig_shot *shot)
-{
-    if (sensor->shot_count >= NPG_RIG_SHOTS_MAX)
-        return npg_error(NPG_BAD_INPUT, "sensor %s: more than %d images", sensor->name, NPG_RIG_SHOTS_MAX);
-    NPG_TRY(npg_arena_grow(&rig->arena, &sensor->shots, &sensor->shot_capacity, sensor->shot_count + 1,
-                           sizeof *sensor->shots));
-    sensor->shots[sensor->shot_count++] = *shot;
-    return NPG_OK;
-}
-
 /* ---- frames ---- */
-
-static npg_status list_numbers(npg_rig *rig)
-{
-    size_t all = 0, count = 0;
-    for (size_t s = 0; s < rig->sensor_count; s++) all += rig->sensors[s].shot_count;
-    rig->numbers = npg_arena_take(&rig->arena, all + 1, sizeof *rig->numbers);
-    NPG_TRY(npg_arena_status(&rig->arena));
-    for (size_t s = 0; s < rig->sensor_count; s++)
-        for (size_t i = 0; i < rig->sensors[s].shot_count; i++)
-            rig->numbers[count++] = rig->sensors[s].shots[i].number;
-    if (count) qsort(rig->numbers, count, sizeof *rig->numbers, npg_order_int64);
-    for (size_t i = 0; i < count; i++)
-        if (!rig->frame_count || rig->numbers[i] != rig->numbers[rig->frame_count - 1])
-            rig->numbers[rig->frame_count++] = rig->numbers[i];
-    return NPG_OK;
-}
-
-/* Shots are in order of their numbers, which they begin with. */
-static int32_t numbered_shot(const npg_rig_sensor *sensor, int64_t number)
-{
-    const npg_rig_shot *found =
-        bsearch(&number, sensor->shots, sensor->shot_count, sizeof *found, npg_order_int64);
-    return found ? (int32_t)(found - sensor->shots) : -1;
-}
-
-npg_status npg_rig_join(npg_rig *rig)
-{
-    if (!rig->sensor_count) return npg_error(NPG_BAD_INPUT, "%s: there is no sensor", rig->path);
-    NPG_TRY(list_numbers(rig));
-    if (!rig->frame_count) return npg_error(NPG_BAD_INPUT, "%s: there is no depth image", rig->path);
-    rig->shot_of = npg_arena_take(&rig->arena, rig->frame_count * rig->sensor_count, sizeof *rig->shot_of);
-    NPG_TRY(npg_arena_status(&rig->arena));
-    for (size_t f = 0; f < rig->frame_count; f++)
-        for (size_t s = 0; s < rig->sensor_count; s++)
-            rig->shot_of[f * rig->sensor_count + s] = numbered_shot(&rig->sensors[s], rig->numbers[f]);
-    return NPG_OK;
-}
 
 size_t npg_rig_find(const npg_rig *rig, int64_t number)
 {

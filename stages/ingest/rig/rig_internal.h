@@ -27,22 +27,10 @@ void npg_pose_invert(double out[12], const double pose[12]); /* of a rotation; o
  * what is off by rounding in a file is made exact. */
 npg_status npg_pose_check(double pose[12], const char *where);
 
-#define NPG_RIG_SHOTS_MAX 4000000            /* images of one sensor: 18 hours at 60 a second           */
-#define NPG_RIG_TEXT_MAX  ((size_t)64 << 20) /* bytes of a calibration                       */
-
 /* ---- between the files of a rig ---- */
 
-npg_status npg_rig_add_sensor(npg_rig *rig, npg_rig_sensor **sensor);
-
-/* Add an image, whose paths are the rig's. */
-npg_status npg_rig_add_shot(npg_rig *rig, npg_rig_sensor *sensor, const npg_rig_shot *shot);
-
-/* Once all shots are there, each sensor's in order of their numbers.  NPG_BAD_INPUT where there is none. */
-npg_status npg_rig_join(npg_rig *rig);
-
+/* Sensors with their shots, each sensor's in order of their numbers. */
 npg_status npg_rig_load_json(npg_rig *rig);
-
-bool npg_rig_ends_with(const char *name, const char *ending);
 
 /* "<rig's folder>/<name>", a text of the rig's, refused under confine where it leads out; NPG_BAD_INPUT where it is
  * not there and must be. */

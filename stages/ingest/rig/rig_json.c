@@ -10,6 +10,9 @@
 #include "pipeline/file.h"
 #include "pipeline/order.h"
 
+#define SHOTS_MAX 4000000            /* images of one sensor: 18 hours at 60 a second */
+#define TEXT_MAX  ((size_t)64 << 20) /* bytes of a rig.json                           */
+
 typedef struct place {
     const char *file;
     char at[128]; /* "sensors[1].camera" */
@@ -179,6 +182,31 @@ static npg_status find_listed(npg_rig *rig, const place *p, const char *key, con
     return NPG_OK;
 }
 
+static npg_status add_sensor(npg_rig *rig, npg_rig_sensor **out)
+{
+    if (rig->sensor_count >= NPG_RIG_SENSORS_MAX)
+        return npg_error(NPG_BAD_INPUT, "%s: more than %d sensors", rig->path, NPG_RIG_SENSORS_MAX);
+    NPG_TRY(npg_arena_grow(&rig->arena, &rig->sensors, &rig->sensor_capacity, rig->sensor_count + 1,
+                           sizeof *rig->sensors));
+    npg_rig_sensor *sensor = &rig->sensors[rig->sensor_count++];
+    *sensor = (npg_rig_sensor){0};
+    npg_pose_identity(sensor->pose);
+    npg_pose_identity(sensor->depth_to_colour);
+    npg_pose_identity(sensor->correction);
+    *out = sensor;
+    return NPG_OK;
+}
+
+static npg_status add_shot(npg_rig *rig, npg_rig_sensor *sensor, const npg_rig_shot *shot)
+{
+    if (sensor->shot_count >= SHOTS_MAX)
+        return npg_error(NPG_BAD_INPUT, "sensor %s: more than %d images", sensor->name, SHOTS_MAX);
+    NPG_TRY(npg_arena_grow(&rig->arena, &sensor->shots, &sensor->shot_capacity, sensor->shot_count + 1,
+                           sizeof *sensor->shots));
+    sensor->shots[sensor->shot_count++] = *shot;
+    return NPG_OK;
+}
+
 static char *path_of_number(const npg_listing *paths, int64_t number)
 {
     const int64_t *found =
@@ -212,7 +240,7 @@ static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place 
                      (long long)shot.number);
             return bad(p, image_keys[k], what);
         }
-        NPG_TRY(npg_rig_add_shot(rig, sensor, &shot));
+        NPG_TRY(add_shot(rig, sensor, &shot));
     }
     return NPG_OK;
 }
@@ -254,9 +282,9 @@ static npg_status load_sensor(npg_rig *rig, const place *p, const json_t *object
     char number[32];
     const char *name = number;
     const json_t *images[3] = {NULL}, *camera = NULL, *other = NULL, *pose = NULL, *poses = NULL;
-    npg_rig_sensor *sensor;
+    npg_rig_sensor *sensor = NULL;
     snprintf(number, sizeof number, "%zu", rig->sensor_count);
-    NPG_TRY(npg_rig_add_sensor(rig, &sensor));
+    NPG_TRY(add_sensor(rig, &sensor));
     sensor->scale = scale;
     sensor->is_opengl = is_opengl;
     const member keys[] = {{"name", TEXT, &name},
@@ -320,10 +348,9 @@ static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)
 npg_status npg_rig_load_json(npg_rig *rig)
 {
     json_t *root;
-    char *file = npg_rig_ends_with(rig->path, ".json") ? rig->path
-                                                       : npg_arena_path(&rig->arena, rig->path, "rig.json");
+    char *file = npg_is_folder(rig->path) ? npg_arena_path(&rig->arena, rig->path, "rig.json") : rig->path;
     NPG_TRY(npg_arena_status(&rig->arena));
-    npg_status status = npg_json_read(&root, file, NPG_RIG_TEXT_MAX);
+    npg_status status = npg_json_read(&root, file, TEXT_MAX);
     if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
     if (!status) status = load_root(rig, file, root);
     json_decref(root);
