@@ -28,9 +28,9 @@ struct npg_follow {
     const char *ending;            /* of all frames, once one was taken; else NULL */
     file *files;                   /* not taken yet, in natural order; owned */
     size_t count, capacity;
-    size_t taken_count, late_count;
-    size_t number_place; /* which run of digits is the number, from the end of the name */
-    int64_t number, step;
+    size_t taken_count;
+    npg_follow_facts facts;
+    int64_t number;
     int64_t gap_before; /* the last number before which some were left out */
     bool is_ended, is_changed;
     double idle_since_s;
@@ -79,18 +79,9 @@ void npg_follow_close(npg_follow **slot)
     npg_release(slot);
 }
 
-int64_t npg_follow_step(const npg_follow *follow)
+const npg_follow_facts *npg_follow_facts_of(const npg_follow *follow)
 {
-    return follow->step;
-}
-size_t npg_follow_late_count(const npg_follow *follow)
-{
-    return follow->late_count;
-}
-
-size_t npg_follow_digits(const npg_follow *follow)
-{
-    return follow->number_place;
+    return &follow->facts;
 }
 
 /* Of the names of frames; the one that most have. */
@@ -103,7 +94,8 @@ static void choose_ending(npg_follow *follow, const void *names, size_t count, s
 /* The name of the file becomes the last one's. */
 static void note_taken(npg_follow *follow, char *name, int64_t number)
 {
-    if (follow->taken_count++) follow->step = npg_common_divisor(number - follow->number, follow->step);
+    if (follow->taken_count++)
+        follow->facts.step = npg_common_divisor(number - follow->number, follow->facts.step);
     follow->number = number;
     npg_release(&follow->last);
     follow->last = name;
@@ -114,7 +106,7 @@ npg_status npg_follow_pass(npg_follow *follow, const char *name, size_t digits, 
     char *copy;
     NPG_TRY(npg_copy_text(&copy, name));
     choose_ending(follow, &copy, 1, sizeof copy);
-    follow->number_place = digits;
+    follow->facts.digits = digits;
     note_taken(follow, copy, number);
     return NPG_OK;
 }
@@ -207,7 +199,7 @@ static npg_status scan_folder(npg_follow *follow)
     if (follow->count) qsort(follow->files, follow->count, sizeof(file), npg_natural_order);
     /* Of the names that were passed, all but the accepted ones turned up behind a later frame. */
     size_t late = s.passed > follow->taken_count ? s.passed - follow->taken_count : 0;
-    if (late > follow->late_count) follow->late_count = late;
+    if (late > follow->facts.late_count) follow->facts.late_count = late;
     follow->is_ended |= is_end;
     return NPG_OK;
 }
@@ -238,7 +230,7 @@ static npg_status wait_and_scan(npg_follow *follow)
 
 static int64_t number_of(const npg_follow *follow, const file *f)
 {
-    int64_t number = npg_name_number(f->name, follow->number_place);
+    int64_t number = npg_name_number(f->name, follow->facts.digits, NULL);
     return number < 0 ? (int64_t)follow->taken_count : number; /* no number in the names: counted from 0 */
 }
 
@@ -246,7 +238,7 @@ static int64_t number_of(const npg_follow *follow, const file *f)
  * digits in the first two names the last one that grows is the number. */
 static void choose_ending_and_number(npg_follow *follow)
 {
-    follow->number_place = 0;
+    follow->facts.digits = 0;
     choose_ending(follow, follow->files, follow->count, sizeof(file));
     size_t kept = 0;
     for (size_t i = 0; i < follow->count; i++) {
@@ -257,15 +249,16 @@ static void choose_ending_and_number(npg_follow *follow)
     }
     follow->count = kept;
     const char *first = follow->files[0].name, *second = kept > 1 ? follow->files[1].name : NULL;
-    while (second && npg_name_number(first, follow->number_place) >= 0 &&
-           npg_name_number(first, follow->number_place) >= npg_name_number(second, follow->number_place))
-        follow->number_place++;
-    if (npg_name_number(first, follow->number_place) < 0) follow->number_place = 0;
+    while (second && npg_name_number(first, follow->facts.digits, NULL) >= 0 &&
+           npg_name_number(first, follow->facts.digits, NULL) >=
+               npg_name_number(second, follow->facts.digits, NULL))
+        follow->facts.digits++;
+    if (npg_name_number(first, follow->facts.digits, NULL) < 0) follow->facts.digits = 0;
 }
 
 static bool leaves_numbers_out(const npg_follow *follow, const file *head)
 {
-    int64_t expected = follow->number + (follow->step ? follow->step : 1);
+    int64_t expected = follow->number + (follow->facts.step ? follow->facts.step : 1);
     return follow->settings.finds_gaps && follow->taken_count && number_of(follow, head) > expected;
 }
 

@@ -55,9 +55,7 @@ static const char *stem_end(const char *path)
     return dot && dot != path && dot[-1] != '/' && !is_digit(dot[1]) ? dot : path + strlen(path);
 }
 
-/* The runs of digits of a path, and the value of the one that is `from_end` runs before the last; -1 for one
- * that is not there or too long for a number. */
-static int64_t run_value(const char *path, size_t from_end, size_t *run_count)
+int64_t npg_name_number(const char *path, size_t from_end, size_t *run_count)
 {
     const char *end = stem_end(path);
     int64_t value = -1;
@@ -71,7 +69,7 @@ static int64_t run_value(const char *path, size_t from_end, size_t *run_count)
         while (first < last - 1 && *first == '0') first++;
         if (seen++ == from_end && last - first <= DIGITS_MAX) value = strtoll(first, NULL, 10);
     }
-    *run_count = seen;
+    if (run_count) *run_count = seen;
     return value;
 }
 
@@ -79,9 +77,9 @@ static int64_t run_value(const char *path, size_t from_end, size_t *run_count)
 static bool number_by_run(int64_t *numbers, char *const *paths, size_t count, size_t from_end)
 {
     size_t runs, first_runs;
-    run_value(paths[0], 0, &first_runs);
+    npg_name_number(paths[0], 0, &first_runs);
     for (size_t i = 0; i < count; i++) {
-        numbers[i] = run_value(paths[i], from_end, &runs);
+        numbers[i] = npg_name_number(paths[i], from_end, &runs);
         if (runs != first_runs || numbers[i] < 0 || (i && numbers[i] <= numbers[i - 1])) return false;
     }
     return true;
@@ -104,17 +102,11 @@ npg_status npg_number_paths(int64_t *numbers, bool *is_numbered, char *const *pa
     if (is_sorted) NPG_TRY(refuse_equal_names(paths, count));
     const char *slash = strrchr(paths[0], '/');
     /* Of one path alone every run "grows": only those of its own name count, not its folders'. */
-    run_value(count == 1 && slash ? slash + 1 : paths[0], 0, &runs);
+    npg_name_number(count == 1 && slash ? slash + 1 : paths[0], 0, &runs);
     for (size_t from_end = 0; from_end < runs && !*is_numbered; from_end++)
         *is_numbered = number_by_run(numbers, paths, count, from_end);
     for (size_t i = 0; i < count && !*is_numbered; i++) numbers[i] = (int64_t)i;
     return NPG_OK;
-}
-
-int64_t npg_name_number(const char *name, size_t from_end)
-{
-    size_t runs;
-    return run_value(name, from_end, &runs);
 }
 
 int64_t npg_common_divisor(int64_t a, int64_t b)

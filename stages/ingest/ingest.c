@@ -111,8 +111,7 @@ static void report_rig(npg_worker *worker, npg_rig *rig)
     json_t *report = npg_worker_report(worker), *sensors = json_array();
     size_t gaps = 0;
     for (size_t i = 0; i < rig->sensor_count; i++) {
-        size_t images = 0;
-        for (size_t f = 0; f < rig->frame_count; f++) images += npg_rig_shot_of(rig, f, i) != NULL;
+        size_t images = rig->sensors[i].shot_count;
         gaps += rig->frame_count - images;
         json_array_append_new(sensors, json_pack("{so sI}", "name", npg_json_text(rig->sensors[i].name),
                                                  "images", (json_int_t)images));

@@ -69,15 +69,12 @@ typedef struct npg_camera {
     double distortion[NPG_DISTORTIONS];
 } npg_camera;
 
-/* Rig: depth sensors with their calibration, and which image of which sensor belongs to which frame.
- *
- * Conventions, once it is loaded: lengths in one unit (metres, as a rule), camera axes as
- * in camera.c (x right, y down, z ahead), poses from sensor to world.
+/* Rig: depth sensors with their calibration, and which image of which sensor belongs to which frame.  Lengths are in
+ * one unit (metres, as a rule).
  *
  * A frame is what all sensors saw at one time.  A sensor whose image is missing then is a gap of that sensor,
  * not of the frame. */
 
-#define NPG_RIG_SENSORS_MAX NPG_FRAME_SENSORS_MOST
 /* What to make of the poses in the files (option sensor-poses). */
 typedef enum npg_rig_poses { NPG_POSES_FILE, NPG_POSES_INVERSE, NPG_POSES_NONE } npg_rig_poses;
 /* Whether pixels without depth say that nothing is there (option background). */
@@ -161,8 +158,6 @@ void npg_rig_pose(const npg_rig *rig, double pose[12], size_t sensor, const npg_
  * give one frame the same points from the same images have the same. */
 uint64_t npg_rig_frame_hash(const npg_rig *rig, size_t frame);
 
-/* ---- points (depth_points.c, rig_read.c) ---- */
-
 /* All points of a frame, of all its sensors: positions, normals that face the sensor, colours where there are
  * colour images, the sensor of each.  frame must be empty.  Sensors are decoded in parallel; the result does
  * not depend on it.  NPG_BAD_INPUT names the image.  A frame without a usable pixel has 0 points. */
@@ -172,10 +167,6 @@ npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *o
  * rig that is there.  NPG_BAD_INPUT. */
 bool npg_rig_is_frame(const char *text);
 npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin);
-
-/* ---- agreement (rig_overlap.c) ---- */
-
-#define NPG_RIG_COMPARED 24 /* frames at most in which sensors are compared */
 
 /* A sensor's pose, by what it sees together with the others. */
 typedef enum npg_rig_verdict {
@@ -198,14 +189,12 @@ typedef struct npg_rig_view {
     double correction[12];        /* x' = correction x, in the world; none unless it is OFF         */
 } npg_rig_view;
 
-/* Compare the surfaces that sensors see in up to NPG_RIG_COMPARED of the given frames (places in the rig),
+/* Compare the surfaces that sensors see in up to 24 of the given frames (places in the rig),
  * spread over them; one entry per sensor.  Images that can't be read count as missing.  NPG_MEMORY. */
 npg_status npg_rig_compare(npg_rig *rig, npg_rig_view *views, const size_t *frames, size_t count);
 
 /* From now on use the corrections: npg_rig_pose() includes them. */
 void npg_rig_correct(npg_rig *rig, const npg_rig_view *views);
-
-/* Rig report: what comparing sensors found, as JSON and text. */
 
 /* Put "pose" ("aligned", "off" ...), "shift", "turn_deg", their deviations, and "correction" (four rows of
  * four, only where it is off) into a sensor's object; lengths in the rig's unit, null: not known. */
@@ -310,8 +299,6 @@ void npg_frame_files_close(npg_frame_files **list);
 /* The numbers of the gaps as text, "3, 7-9", ended by "..." where it does not fit. */
 void npg_frame_files_gaps(char *text, size_t size, const npg_frame_files *list);
 
-/* Frame names: natural order, and the frame number inside a file's name. */
-
 /* Compares as people count: runs of digits by their value ("f2" before "f10").  Names that differ only in
  * leading zeros are equal. */
 int npg_natural_compare(const char *a, const char *b);
@@ -319,8 +306,6 @@ int npg_natural_compare(const char *a, const char *b);
 /* The same of pointers to texts, or to structs that begin with one, as qsort() and bsearch() ask; equal names by their
  * bytes. */
 int npg_natural_order(const void *left, const void *right);
-
-/* Input list: the frames that the options of a run name, those of files or of a rig (ingest.c). */
 
 /* The files that the options of a run (input, frames, missing, confine, those of rigs) name as its frames; of
  * a rig the description is read, else nothing.  As npg_frame_files_open() and, with confine,
@@ -401,7 +386,7 @@ extern const npg_fact_kind npg_fact_frame_store;
 typedef struct npg_spooled {
     int64_t number;
     int64_t index;       /* -1: it was not selected (option frames)                                   */
-    int64_t digits;      /* npg_follow_digits() at the time                                           */
+    int64_t digits;      /* npg_follow_facts at the time                                           */
     int64_t points;      /* how many came; -1: the frame is missing                                   */
     uint64_t hash;       /* XXH3 of what came                                                         */
     uint64_t key;        /* of this and all that came before                                          */

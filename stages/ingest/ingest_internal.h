@@ -127,8 +127,6 @@ void npg_rows_add(npg_builder *builder, const npg_columns *columns, const unsign
 npg_status npg_rows_read(npg_builder *builder, npg_source *source, const npg_columns *columns, uint64_t count,
                          size_t row_size, uint64_t *done);
 
-/* Frame names: the frame number inside a file's name. */
-
 /* The number of every path: the last run of digits (the ending aside) that grows from each
  * path to the next.  *is_numbered is false where there is none; the numbers are then 0, 1, 2 ...
  * One path alone is numbered by the last run of its file name.  is_sorted: NPG_BAD_INPUT when two neighbours
@@ -136,16 +134,14 @@ npg_status npg_rows_read(npg_builder *builder, npg_source *source, const npg_col
 npg_status npg_number_paths(int64_t *numbers, bool *is_numbered, char *const *paths, size_t count,
                             bool is_sorted);
 
-/* The value of the run of digits that stands `from_end` runs before the last one of a name, its ending aside;
- * -1 where there is none or it is too long for a number. */
-int64_t npg_name_number(const char *name, size_t from_end);
+/* The value of the run of digits that stands `from_end` runs before the last one of a path, its ending aside;
+ * -1 where there is none or it is too long for a number.  *run_count, or NULL: how many runs there are. */
+int64_t npg_name_number(const char *path, size_t from_end, size_t *run_count);
 
 /* The largest number that divides both, for the step of a numbering; the other one when one is 0. */
 int64_t npg_common_divisor(int64_t a, int64_t b);
 
-/* Frame inputs: the files that a folder, pattern, glob, list or single path stands for. */
-
-/* In time order, at least one.  See npg_frame_files_open. */
+/* The files that a folder, pattern, glob, list or single path stands for, in time order, at least one. */
 npg_status npg_paths_find(npg_listing *out, const char *input);
 
 /* Capture: the frames of a capture in files, readable in any order, with a store of what was read. */
@@ -212,25 +208,25 @@ npg_status npg_follow_open(npg_follow **follow, const npg_follow_settings *setti
 void npg_follow_close(npg_follow **follow);
 
 /* A file that an earlier run has taken, in their order: the next frame is one behind it in natural order.  digits:
- * npg_follow_digits() of that run.  NPG_MEMORY. */
+ * npg_follow_facts of that run.  NPG_MEMORY. */
 npg_status npg_follow_pass(npg_follow *follow, const char *name, size_t digits, int64_t number);
 
 /* Files that are there now and were not taken. */
 npg_status npg_follow_count_new(npg_follow *follow, size_t *count);
-
-/* Which run of digits in the names is the number, counted from the end. */
-size_t npg_follow_digits(const npg_follow *follow);
 
 /* The next frame into the empty *frame, with its number, waiting for it.  NPG_PARTIAL: its file is broken:
  * the frame has number and path but no points, and npg_error_text() says why.  NPG_END, NPG_STOPPED;
  * NPG_BAD_INPUT when the numbers in the names don't grow. */
 npg_status npg_follow_next(npg_follow *follow, npg_frame *frame, npg_origin *origin);
 
-/* By what the numbers grow from frame to frame, 0 while one frame came; it can only get smaller. */
-int64_t npg_follow_step(const npg_follow *follow);
+typedef struct npg_follow_facts {
+    size_t digits; /* which run of digits in the names is the number, counted from the end               */
+    int64_t step;  /* by what numbers grow, 0 while one frame came; it can only get smaller              */
+    size_t
+        late_count; /* files that were found after a later one had been taken, and are left out           */
+} npg_follow_facts;
 
-/* Files that were found after a later one had been taken, and are left out. */
-size_t npg_follow_late_count(const npg_follow *follow);
+const npg_follow_facts *npg_follow_facts_of(const npg_follow *follow);
 
 /* Live source: frames from standard input, from a folder that grows, or from those that are pushed, each as
  * soon as it is there, with the numbers that are left out between them.
@@ -273,7 +269,7 @@ npg_status npg_live_source_end(npg_live_source *live);
 
 typedef struct npg_probe {
     npg_capture_facts *facts; /* what is counted; a loan */
-    size_t *counts;           /* points of every readable frame, owned */
+    int64_t *counts;          /* points of every readable frame, owned */
     size_t count_room, zero_normals;
     npg_origin origin;
     npg_bounds bounds; /* local, of finite points */

@@ -247,7 +247,7 @@ static npg_status spool(npg_live_source *live, const npg_frame *frame, bool is_m
                          .is_missing = is_missing,
                          .is_held = frame->is_held,
                          .is_skipped = frame->is_skipped};
-    if (live->follow) entry.digits = (int64_t)npg_follow_digits(live->follow);
+    if (live->follow) entry.digits = (int64_t)npg_follow_facts_of(live->follow)->digits;
     if (!is_missing) entry.points = (int64_t)frame->point_count;
     if (!is_missing) entry.hash = npg_spool_hash(frame);
     const char *cause = frame->is_skipped && !is_missing ? live->cause : NULL;
@@ -311,7 +311,7 @@ static npg_status check_step(npg_live_source *live, int64_t step, int64_t number
 static npg_status count_gap(npg_live_source *live, const npg_frame *frame)
 {
     int missing = live->settings.missing;
-    int64_t step = live->follow ? npg_follow_step(live->follow) : 1;
+    int64_t step = live->follow ? npg_follow_facts_of(live->follow)->step : 1;
     bool fills = missing == NPG_MISSING_SKIP || missing == NPG_MISSING_HOLD;
     bool is_checked = live->follow ? missing != NPG_MISSING_IGNORE : fills && !live->stream;
     live->gap_left = 0;
@@ -380,7 +380,7 @@ static npg_status check_end(npg_live_source *live)
 static npg_status end_live(npg_live_source *live)
 {
     json_t *report = npg_worker_report(live->worker);
-    size_t late_count = live->follow ? npg_follow_late_count(live->follow) : 0;
+    size_t late_count = live->follow ? npg_follow_facts_of(live->follow)->late_count : 0;
     const char *name = name_of(live);
     live->is_ended = true;
     if (!live->next) return npg_error(NPG_BAD_INPUT, "%s: no frame came", name);

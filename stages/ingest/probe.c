@@ -11,6 +11,7 @@
 
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"
+#include "pipeline/order.h"
 
 void npg_probe_warn(npg_probe *probe, const char *format, ...)
 {
@@ -87,7 +88,7 @@ static npg_status add_frame(npg_probe *probe, const npg_frame *frame, const char
     npg_capture_facts *all = probe->facts;
     NPG_TRY(npg_grow(&probe->counts, &probe->count_room, all->frames - all->unreadable + 1,
                      sizeof *probe->counts, NPG_FOR_FILES));
-    probe->counts[all->frames++ - all->unreadable] = frame->point_count;
+    probe->counts[all->frames++ - all->unreadable] = (int64_t)frame->point_count;
     all->with_normals += frame->normals != NULL;
     all->points_total += frame->point_count;
     all->not_finite += facts.not_finite;
@@ -179,12 +180,6 @@ npg_status npg_probe_files(npg_probe *probe, const npg_frame_files *list)
     return NPG_OK;
 }
 
-static int compare_sizes(const void *a, const void *b)
-{
-    size_t x = *(const size_t *)a, y = *(const size_t *)b;
-    return (x > y) - (x < y);
-}
-
 /* What only shows when all frames have been read. */
 static void finish_counts(npg_probe *probe)
 {
@@ -196,10 +191,10 @@ static void finish_counts(npg_probe *probe)
         all->box_high[a] = probe->origin.world[a] + probe->bounds.hi[a];
     }
     if (readable) {
-        qsort(probe->counts, readable, sizeof *probe->counts, compare_sizes);
-        all->points_least = probe->counts[0];
-        all->points_median = probe->counts[readable / 2];
-        all->points_most = probe->counts[readable - 1];
+        qsort(probe->counts, readable, sizeof *probe->counts, npg_order_int64);
+        all->points_least = (size_t)probe->counts[0];
+        all->points_median = (size_t)probe->counts[readable / 2];
+        all->points_most = (size_t)probe->counts[readable - 1];
     }
     if (!is_empty(&probe->bounds) && npg_frame_box_set(&box, &probe->origin, &probe->bounds))
         npg_probe_warn(probe, "%s", npg_error_text());

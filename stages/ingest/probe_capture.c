@@ -80,13 +80,6 @@ static npg_status read_all(job *j)
 
 /* ---- output ---- */
 
-static size_t images_of(const npg_rig *rig, size_t s)
-{
-    size_t count = 0;
-    for (size_t f = 0; f < rig->frame_count; f++) count += npg_rig_shot_of(rig, f, s) != NULL;
-    return count;
-}
-
 static void print_pose(FILE *out, const job *j, size_t s)
 {
     const npg_rig *rig = j->list->rig;
@@ -112,8 +105,8 @@ static void print_sensors(FILE *out, const job *j)
     const npg_rig *rig = j->list ? j->list->rig : NULL;
     for (size_t s = 0; rig && j->views && s < rig->sensor_count; s++) {
         const npg_rig_view *v = &j->views[s];
-        fprintf(out, "sensor    %-12s %zu images, %zu points each", rig->sensors[s].name, images_of(rig, s),
-                v->frames ? v->points / v->frames : 0);
+        fprintf(out, "sensor    %-12s %zu images, %zu points each", rig->sensors[s].name,
+                rig->sensors[s].shot_count, v->frames ? v->points / v->frames : 0);
         char text[160];
         npg_rig_describe_length(text, sizeof text, rig, v->apart);
         if (rig->sensor_count > 1)
@@ -132,7 +125,7 @@ static json_t *json_of_sensors(const job *j)
     for (size_t s = 0; s < rig->sensor_count; s++) {
         const npg_rig_view *v = &j->views[s];
         json_t *one = json_pack("{so sI sI sf sf}", "name", npg_json_text(rig->sensors[s].name), "images",
-                                (json_int_t)images_of(rig, s), "points",
+                                (json_int_t)rig->sensors[s].shot_count, "points",
                                 (json_int_t)(v->frames ? v->points / v->frames : 0), "overlap", v->overlap,
                                 "apart", v->apart);
         npg_rig_report_pose(one, v);

@@ -94,7 +94,7 @@ static const char *follow_all(const npg_follow_settings *wanted, char seen[256])
             snprintf(seen + used, 256 - used, "%d%s ", (int)frame.number, status ? "!" : "");
         else
             snprintf(seen + used, 256 - used, "%s late %d", npg_status_name(status),
-                     (int)npg_follow_late_count(follow));
+                     (int)npg_follow_facts_of(follow)->late_count);
         if (status == NPG_OK) assert_int_equal(frame.point_count, 1);
         npg_frame_clear(&frame);
     }

@@ -93,8 +93,7 @@ const char *npg_reader_for(const char *path)
 {
     npg_source *source = NULL;
     const struct format *format = by_ending(path);
-    if (npg_source_open_file(&source, path)) return format ? format->name : NULL;
-    if (find_format(&format, source)) format = NULL;
+    if (!npg_source_open_file(&source, path) && find_format(&format, source)) format = NULL;
     npg_source_close(&source);
     return format ? format->name : NULL;
 }

@@ -65,24 +65,21 @@ static npg_status list_numbers(npg_rig *rig)
     return NPG_OK;
 }
 
-/* Shots are in order of their numbers, which they begin with. */
-static int32_t numbered_shot(const npg_rig_sensor *sensor, int64_t number)
-{
-    const npg_rig_shot *found =
-        bsearch(&number, sensor->shots, sensor->shot_count, sizeof *found, npg_order_int64);
-    return found ? (int32_t)(found - sensor->shots) : -1;
-}
-
 static npg_status join(npg_rig *rig)
 {
-    if (!rig->sensor_count) return npg_error(NPG_BAD_INPUT, "%s: there is no sensor", rig->path);
     NPG_TRY(list_numbers(rig));
     if (!rig->frame_count) return npg_error(NPG_BAD_INPUT, "%s: there is no depth image", rig->path);
     rig->shot_of = npg_arena_take(&rig->arena, rig->frame_count * rig->sensor_count, sizeof *rig->shot_of);
     NPG_TRY(npg_arena_status(&rig->arena));
     for (size_t f = 0; f < rig->frame_count; f++)
-        for (size_t s = 0; s < rig->sensor_count; s++)
-            rig->shot_of[f * rig->sensor_count + s] = numbered_shot(&rig->sensors[s], rig->numbers[f]);
+        for (size_t s = 0; s < rig->sensor_count; s++) {
+            /* they begin with their numbers, and are in that order */
+            const npg_rig_sensor *of = &rig->sensors[s];
+            const npg_rig_shot *shot = of->shot_count ? bsearch(&rig->numbers[f], of->shots, of->shot_count,
+                                                                sizeof *shot, npg_order_int64)
+                                                      : NULL;
+            rig->shot_of[f * rig->sensor_count + s] = shot ? (int32_t)(shot - of->shots) : -1;
+        }
     return NPG_OK;
 }
 

@@ -31,7 +31,7 @@ typedef struct solving {
     double (*poses)[12];              /* frame_count x sensor_count: corrected;         */
     frame_sums *frames;               /*                                                */
     double *matrix, *gradient, *rows; /* n x n, n, 2 x n;                               */
-    size_t unknowns, parts;
+    size_t unknowns;
     double reach, sigma;
 } solving;
 
@@ -97,8 +97,9 @@ static void add_pair(const solving *s, frame_sums *sums, const npg_rig_sight_pai
     }
 }
 
-static void sum_frame(solving *s, size_t f)
+static npg_status sum_frame(void *user, size_t f)
 {
+    solving *s = user;
     const npg_rig_sights *sights = s->sights;
     frame_sums *sums = &s->frames[f];
     size_t count = sights->sensor_count, n = s->unknowns;
@@ -117,12 +118,6 @@ static void sum_frame(solving *s, size_t f)
                     add_pair(s, sums, &pair, s->slot[a], s->slot[b]);
             }
         }
-}
-
-static npg_status sum_part(void *user, size_t part)
-{
-    solving *s = user;
-    for (size_t f = part; f < s->sights->frame_count; f += s->parts) sum_frame(s, f);
     return NPG_OK;
 }
 
@@ -146,8 +141,7 @@ static npg_status sum_all(solving *s)
 {
     size_t n = s->unknowns;
     pose_all(s);
-    s->parts = npg_parallel_parts(s->sights->frame_count, 1, 0);
-    NPG_TRY(npg_parallel(sum_part, s, s->parts));
+    NPG_TRY(npg_parallel(sum_frame, s, s->sights->frame_count));
     memset(s->matrix, 0, n * n * sizeof *s->matrix);
     memset(s->gradient, 0, n * sizeof *s->gradient);
     for (size_t f = 0; f < s->sights->frame_count; f++) {

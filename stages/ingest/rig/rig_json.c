@@ -2,6 +2,7 @@
  *
  *     {"neupig_rig": 1, "sensors": [{"depth": "front/depth_%04d.png", "camera": {...}, "pose": [...]}]} */
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,22 +14,15 @@
 #define SHOTS_MAX 4000000            /* images of one sensor: 18 hours at 60 a second */
 #define TEXT_MAX  ((size_t)64 << 20) /* bytes of a rig.json                           */
 
-typedef struct place {
-    const char *file;
-    char at[128]; /* "sensors[1].camera" */
-} place;
-
-static npg_status bad(const place *p, const char *key, const char *what)
+/* at: the place of the object in the file, "sensors[1].camera". */
+static npg_status NPG_PRINTF(3, 4) bad(const char *at, const char *key, const char *format, ...)
 {
-    return npg_error(NPG_BAD_INPUT, "%s: %s%s%s: %s", p->file, p->at, p->at[0] && key[0] ? "." : "", key,
-                     what);
-}
-
-static place inside(const place *p, const char *key)
-{
-    place in = {.file = p->file};
-    snprintf(in.at, sizeof in.at, "%.90s%s%.30s", p->at, p->at[0] ? "." : "", key);
-    return in;
+    char what[400];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(what, sizeof what, format, arguments);
+    va_end(arguments);
+    return npg_error(NPG_BAD_INPUT, "%s%s%s: %s", at, at[0] && key[0] ? "." : "", key, what);
 }
 
 /* ---- values ---- */
@@ -42,30 +36,30 @@ typedef struct member {
     void *value; /* double, const char * or const json_t *; NULL: of no interest */
 } member;
 
-static npg_status take_value(const place *p, const member *k, const json_t *found)
+static npg_status take_value(const char *at, const member *k, const json_t *found)
 {
-    if (!found) return k->kind == NUMBER_NEEDED ? bad(p, k->name, "is missing") : NPG_OK;
+    if (!found) return k->kind == NUMBER_NEEDED ? bad(at, k->name, "is missing") : NPG_OK;
     if (k->kind == ANY) {
         *(const json_t **)k->value = found;
     } else if (k->kind == TEXT) {
         const char *text = json_string_value(found);
-        if (!text || !*text || strlen(text) >= 4096) return bad(p, k->name, "must be a text, and not empty");
+        if (!text || !*text || strlen(text) >= 4096) return bad(at, k->name, "must be a text, and not empty");
         if (k->value) *(const char **)k->value = text;
     } else {
-        if (!json_is_number(found)) return bad(p, k->name, "must be a number");
+        if (!json_is_number(found)) return bad(at, k->name, "must be a number");
         *(double *)k->value = json_number_value(found);
-        if (!isfinite(json_number_value(found))) return bad(p, k->name, "must be finite");
+        if (!isfinite(json_number_value(found))) return bad(at, k->name, "must be finite");
     }
     return NPG_OK;
 }
 
 /* Refuse an object with other keys, and take the values of these. */
-static npg_status take(const place *p, const json_t *object, const member *keys, size_t count)
+static npg_status take(const char *at, const json_t *object, const member *keys, size_t count)
 {
     const char *name;
     json_t *value;
     char what[256] = "unknown key; known are";
-    if (!json_is_object(object)) return bad(p, "", "must be an object");
+    if (!json_is_object(object)) return bad(at, "", "must be an object");
     json_object_foreach((json_t *)object, name, value)
     {
         size_t k = 0;
@@ -75,94 +69,92 @@ static npg_status take(const place *p, const json_t *object, const member *keys,
             size_t used = strlen(what);
             snprintf(what + used, sizeof what - used, "%s %s", i ? "," : "", keys[i].name);
         }
-        return bad(p, name, what);
+        return bad(at, name, "%s", what);
     }
     for (size_t k = 0; k < count; k++)
-        NPG_TRY(take_value(p, &keys[k], json_object_get(object, keys[k].name)));
+        NPG_TRY(take_value(at, &keys[k], json_object_get(object, keys[k].name)));
     return NPG_OK;
 }
 
 /* Up to `most` numbers; *count says how many there are. */
-static npg_status get_numbers(const place *p, const char *key, const json_t *found, double *values,
+static npg_status get_numbers(const char *at, const char *key, const json_t *found, double *values,
                               size_t most, size_t *count)
 {
     *count = 0;
-    if (!json_is_array(found)) return bad(p, key, "must be a list of numbers");
+    if (!json_is_array(found)) return bad(at, key, "must be a list of numbers");
     for (size_t i = 0; i < json_array_size(found); i++) {
         const json_t *item = json_array_get(found, i);
-        if (i >= most) return bad(p, key, "has more numbers than it may have");
+        if (i >= most) return bad(at, key, "has more numbers than it may have");
         if (!json_is_number(item) || !isfinite(json_number_value(item)))
-            return bad(p, key, "must be a list of finite numbers");
+            return bad(at, key, "must be a list of finite numbers");
         values[(*count)++] = json_number_value(item);
     }
     return NPG_OK;
 }
 
 /* Four rows of four; found may be NULL. */
-static npg_status get_pose(const place *p, const char *key, const json_t *found, double pose[12])
+static npg_status get_pose(const char *at, const char *key, const json_t *found, double pose[12])
 {
     double m[16];
     size_t count;
-    char where[512];
+    char where[256];
     if (!found) return NPG_OK;
-    NPG_TRY(get_numbers(p, key, found, m, 16, &count));
-    if (count != 16) return bad(p, key, "must be 16 numbers: four rows of a 4 x 4 matrix");
+    NPG_TRY(get_numbers(at, key, found, m, 16, &count));
+    if (count != 16) return bad(at, key, "must be 16 numbers: four rows of a 4 x 4 matrix");
     if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
-        return bad(p, key, "its last row must be 0 0 0 1");
+        return bad(at, key, "its last row must be 0 0 0 1");
     memcpy(pose, m, 12 * sizeof *m);
-    snprintf(where, sizeof where, "%.300s: %s.%s", p->file, p->at, key);
+    snprintf(where, sizeof where, "%s.%s", at, key);
     return npg_pose_check(pose, where);
 }
 
 /* ---- cameras ---- */
 
 /* from_depth: NULL for a camera of depth images, which has no such key. */
-static npg_status get_camera(const place *p, const json_t *object, npg_camera *camera, double from_depth[12])
+static npg_status get_camera(const char *at, const json_t *object, npg_camera *camera, double from_depth[12])
 {
     double width = 0, height = 0;
     const json_t *distortion = NULL, *matrix = NULL;
     size_t count = 0;
-    char where[512];
     *camera = (npg_camera){0};
     const member keys[] = {{"width", NUMBER_NEEDED, &width},   {"height", NUMBER_NEEDED, &height},
                            {"fx", NUMBER_NEEDED, &camera->fx}, {"fy", NUMBER_NEEDED, &camera->fy},
                            {"cx", NUMBER_NEEDED, &camera->cx}, {"cy", NUMBER_NEEDED, &camera->cy},
                            {"distortion", ANY, &distortion},   {"from_depth", ANY, &matrix}};
-    NPG_TRY(take(p, object, keys, sizeof keys / sizeof *keys - !from_depth));
+    NPG_TRY(take(at, object, keys, sizeof keys / sizeof *keys - !from_depth));
     if (!(fmin(width, height) >= 1 && fmax(width, height) <= NPG_IMAGE_SIDE_MAX && width == floor(width) &&
           height == floor(height)))
-        return bad(p, "width", "and height must be whole numbers of pixels");
+        return bad(at, "width", "and height must be whole numbers of pixels");
     camera->width = (size_t)width;
     camera->height = (size_t)height;
     if (distortion)
-        NPG_TRY(get_numbers(p, "distortion", distortion, camera->distortion, NPG_DISTORTIONS, &count));
+        NPG_TRY(get_numbers(at, "distortion", distortion, camera->distortion, NPG_DISTORTIONS, &count));
     if (distortion && count != 4 && count != 5 && count != 8)
-        return bad(p, "distortion", "must be 4, 5 or 8 numbers: k1 k2 p1 p2 [k3 [k4 k5 k6]]");
-    NPG_TRY(get_pose(p, "from_depth", matrix, from_depth));
-    snprintf(where, sizeof where, "%.300s: %s", p->file, p->at);
-    return npg_camera_check(camera, where);
+        return bad(at, "distortion", "must be 4, 5 or 8 numbers: k1 k2 p1 p2 [k3 [k4 k5 k6]]");
+    NPG_TRY(get_pose(at, "from_depth", matrix, from_depth));
+    return npg_camera_check(camera, at);
 }
 
 /* ---- images ---- */
 
 /* Files of a numbered pattern, in order; the pattern starts from the rig's folder. */
-static npg_status find_numbered(npg_rig *rig, const place *p, const char *key, const char *pattern,
+static npg_status find_numbered(npg_rig *rig, const char *at, const char *key, const char *pattern,
                                 npg_listing *paths)
 {
     char *path;
     if (!pattern || (!strchr(pattern, '%') && !strchr(pattern, '#')))
-        return bad(p, key,
-                   "must be a pattern with the frame's number, such as depth_%04d.png, or a list of images "
+        return bad(at, key,
+                   "must be a pattern with the frame's number, such as depth_%%04d.png, or a list of images "
                    "(rig_json.py makes it of a file with times)");
     NPG_TRY(npg_rig_path(rig, &path, pattern, false));
     npg_status status = npg_paths_find(paths, path);
     if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
-    if (!status && !paths->numbers) status = bad(p, key, "must be a pattern with the frame's number");
-    return status < 0 ? npg_error_prefix(status, "%s: %s.%s", p->file, p->at, key) : status;
+    if (!status && !paths->numbers) status = bad(at, key, "must be a pattern with the frame's number");
+    return status < 0 ? npg_error_prefix(status, "%s.%s", at, key) : status;
 }
 
 /* Files that are listed, numbered from 0. */
-static npg_status find_listed(npg_rig *rig, const place *p, const char *key, const json_t *list,
+static npg_status find_listed(npg_rig *rig, const char *at, const char *key, const json_t *list,
                               npg_listing *paths)
 {
     size_t count = json_array_size(list);
@@ -175,7 +167,7 @@ static npg_status find_listed(npg_rig *rig, const place *p, const char *key, con
         const char *name = json_string_value(item);
         if (json_is_null(item)) continue;
         if (!name || !*name || strlen(name) >= 4096)
-            return bad(p, key, "must hold the names of images, and null for frames without one");
+            return bad(at, key, "must hold the names of images, and null for frames without one");
         paths->numbers[paths->count] = (int64_t)i;
         NPG_TRY(npg_rig_path(rig, &paths->paths[paths->count++], name, true));
     }
@@ -184,8 +176,8 @@ static npg_status find_listed(npg_rig *rig, const place *p, const char *key, con
 
 static npg_status add_sensor(npg_rig *rig, npg_rig_sensor **out)
 {
-    if (rig->sensor_count >= NPG_RIG_SENSORS_MAX)
-        return npg_error(NPG_BAD_INPUT, "%s: more than %d sensors", rig->path, NPG_RIG_SENSORS_MAX);
+    if (rig->sensor_count >= NPG_FRAME_SENSORS_MOST)
+        return npg_error(NPG_BAD_INPUT, "more than %d sensors", NPG_FRAME_SENSORS_MOST);
     NPG_TRY(npg_arena_grow(&rig->arena, &rig->sensors, &rig->sensor_capacity, rig->sensor_count + 1,
                            sizeof *rig->sensors));
     npg_rig_sensor *sensor = &rig->sensors[rig->sensor_count++];
@@ -218,7 +210,7 @@ static const char *const image_keys[] = {"depth", "colour", "mask"};
 
 /* Of images with numbers every one of depth needs its colour image and mask, if there are any for this sensor: where
  * one is missing the recording is out of step. */
-static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place *p,
+static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const char *at,
                               const json_t *const images[3])
 {
     npg_listing lists[3];
@@ -226,8 +218,8 @@ static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place 
         lists[k] = (npg_listing){.arena = &rig->arena};
         if (images[k])
             NPG_TRY(json_is_array(images[k])
-                        ? find_listed(rig, p, image_keys[k], images[k], &lists[k])
-                        : find_numbered(rig, p, image_keys[k], json_string_value(images[k]), &lists[k]));
+                        ? find_listed(rig, at, image_keys[k], images[k], &lists[k])
+                        : find_numbered(rig, at, image_keys[k], json_string_value(images[k]), &lists[k]));
     }
     for (size_t i = 0; i < lists[0].count; i++) {
         npg_rig_shot shot = {.number = lists[0].numbers[i], .depth = lists[0].paths[i]};
@@ -235,10 +227,8 @@ static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place 
         for (size_t k = 1; k < 3; k++) {
             *paths[k] = path_of_number(&lists[k], shot.number);
             if (!images[k] || *paths[k] || lists[k].is_listed) continue;
-            char what[160];
-            snprintf(what, sizeof what, "frame %lld has a depth image, but none of these",
-                     (long long)shot.number);
-            return bad(p, image_keys[k], what);
+            return bad(at, image_keys[k], "frame %lld has a depth image, but none of these",
+                       (long long)shot.number);
         }
         NPG_TRY(add_shot(rig, sensor, &shot));
     }
@@ -246,17 +236,15 @@ static npg_status load_images(npg_rig *rig, npg_rig_sensor *sensor, const place 
 }
 
 /* One for each depth image, in their order. */
-static npg_status get_poses(npg_rig_sensor *sensor, const place *p, const json_t *poses)
+static npg_status get_poses(npg_rig_sensor *sensor, const char *at, const json_t *poses)
 {
-    char text[160];
-    if (json_array_size(poses) != sensor->shot_count) {
-        snprintf(text, sizeof text, "%zu poses, but %zu depth images (rig_json.py lists those of a file)",
-                 json_array_size(poses), sensor->shot_count);
-        return bad(p, "poses", text);
-    }
+    char text[32];
+    if (json_array_size(poses) != sensor->shot_count)
+        return bad(at, "poses", "%zu poses, but %zu depth images (rig_json.py lists those of a file)",
+                   json_array_size(poses), sensor->shot_count);
     for (size_t i = 0; i < sensor->shot_count; i++) {
         snprintf(text, sizeof text, "poses[%zu]", i);
-        NPG_TRY(get_pose(p, text, json_array_get(poses, i), sensor->shots[i].pose));
+        NPG_TRY(get_pose(at, text, json_array_get(poses, i), sensor->shots[i].pose));
         sensor->shots[i].has_pose = true;
     }
     return NPG_OK;
@@ -265,18 +253,16 @@ static npg_status get_poses(npg_rig_sensor *sensor, const place *p, const json_t
 /* ---- sensors ---- */
 
 /* Two sensors with the same images: a copied line of the description. */
-static npg_status check_alone(const npg_rig *rig, const npg_rig_sensor *sensor, const place *p)
+static npg_status check_alone(const npg_rig *rig, const npg_rig_sensor *sensor, const char *at)
 {
-    char what[160];
     for (const npg_rig_sensor *other = rig->sensors; other < sensor && sensor->shot_count; other++) {
         if (!other->shot_count || strcmp(other->shots[0].depth, sensor->shots[0].depth) != 0) continue;
-        snprintf(what, sizeof what, "its images are those of sensor %.80s, too", other->name);
-        return bad(p, "depth", what);
+        return bad(at, "depth", "its images are those of sensor %.80s, too", other->name);
     }
     return NPG_OK;
 }
 
-static npg_status load_sensor(npg_rig *rig, const place *p, const json_t *object, double scale,
+static npg_status load_sensor(npg_rig *rig, const char *at, const json_t *object, double scale,
                               bool is_opengl)
 {
     char number[32];
@@ -298,27 +284,28 @@ static npg_status load_sensor(npg_rig *rig, const place *p, const json_t *object
                            {"near", NUMBER, &sensor->near_m},
                            {"far", NUMBER, &sensor->far_m},
                            {"depth_scale", NUMBER, &sensor->scale}};
-    NPG_TRY(take(p, object, keys, sizeof keys / sizeof *keys));
+    NPG_TRY(take(at, object, keys, sizeof keys / sizeof *keys));
     sensor->name = npg_arena_text(&rig->arena, name);
     NPG_TRY(npg_arena_status(&rig->arena));
-    if (!(sensor->scale > 0)) return bad(p, "depth_scale", "must be more than 0");
-    if (sensor->far_m > 0 && sensor->near_m >= sensor->far_m) return bad(p, "near", "must be less than far");
-    if (!images[0]) return bad(p, "depth", "is missing");
-    if (!camera) return bad(p, "camera", "is missing: the intrinsics of the depth image");
-    if (pose && poses) return bad(p, "poses", "a sensor has either one pose or one per frame");
-    place in = inside(p, "camera"), in_colour = inside(p, "colour_camera");
-    NPG_TRY(get_camera(&in, camera, &sensor->camera, NULL));
+    if (!(sensor->scale > 0)) return bad(at, "depth_scale", "must be more than 0");
+    if (sensor->far_m > 0 && sensor->near_m >= sensor->far_m) return bad(at, "near", "must be less than far");
+    if (!images[0]) return bad(at, "depth", "is missing");
+    if (!camera) return bad(at, "camera", "is missing: the intrinsics of the depth image");
+    if (pose && poses) return bad(at, "poses", "a sensor has either one pose or one per frame");
+    char in[64], in_colour[64];
+    snprintf(in, sizeof in, "%s.camera", at);
+    snprintf(in_colour, sizeof in_colour, "%s.colour_camera", at);
+    NPG_TRY(get_camera(in, camera, &sensor->camera, NULL));
     sensor->has_colour_camera = other != NULL;
-    if (other) NPG_TRY(get_camera(&in_colour, other, &sensor->colour_camera, sensor->depth_to_colour));
-    NPG_TRY(get_pose(p, "pose", pose, sensor->pose));
-    NPG_TRY(load_images(rig, sensor, p, images));
-    if (poses) NPG_TRY(get_poses(sensor, p, poses));
-    return check_alone(rig, sensor, p);
+    if (other) NPG_TRY(get_camera(in_colour, other, &sensor->colour_camera, sensor->depth_to_colour));
+    NPG_TRY(get_pose(at, "pose", pose, sensor->pose));
+    NPG_TRY(load_images(rig, sensor, at, images));
+    if (poses) NPG_TRY(get_poses(sensor, at, poses));
+    return check_alone(rig, sensor, at);
 }
 
-static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)
+static npg_status load_root(npg_rig *rig, const json_t *root)
 {
-    const place top = {.file = file};
     const char *axes = "opencv", *unit = NULL;
     const json_t *sensors = NULL;
     double scale = 0.001, version = 0;
@@ -328,19 +315,17 @@ static npg_status load_root(npg_rig *rig, const char *file, const json_t *root)
                            {"axes", TEXT, &axes},
                            {"unit", TEXT, &unit},
                            {"sensors", ANY, &sensors}};
-    NPG_TRY(take(&top, root, keys, sizeof keys / sizeof *keys));
-    if (version != 1) return bad(&top, "neupig_rig", "this program knows version 1");
+    NPG_TRY(take("", root, keys, sizeof keys / sizeof *keys));
+    if (version != 1) return bad("", "neupig_rig", "this program knows version 1");
     if (unit) rig->unit = npg_arena_text(&rig->arena, unit);
     const bool is_opengl = !strcmp(axes, "opengl");
     if (!is_opengl && strcmp(axes, "opencv") != 0)
-        return bad(&top, "axes",
-                   "must be opencv (x right, y down, z ahead) or opengl (x right, y up, z back)");
-    if (!json_array_size(sensors)) return bad(&top, "sensors", "must be a list of at least one sensor");
+        return bad("", "axes", "must be opencv (x right, y down, z ahead) or opengl (x right, y up, z back)");
+    if (!json_array_size(sensors)) return bad("", "sensors", "must be a list of at least one sensor");
     for (size_t s = 0; s < json_array_size(sensors); s++) {
-        char key[32];
-        snprintf(key, sizeof key, "sensors[%zu]", s);
-        place p = inside(&top, key);
-        NPG_TRY(load_sensor(rig, &p, json_array_get(sensors, s), scale, is_opengl));
+        char at[32];
+        snprintf(at, sizeof at, "sensors[%zu]", s);
+        NPG_TRY(load_sensor(rig, at, json_array_get(sensors, s), scale, is_opengl));
     }
     return NPG_OK;
 }
@@ -352,7 +337,7 @@ npg_status npg_rig_load_json(npg_rig *rig)
     NPG_TRY(npg_arena_status(&rig->arena));
     npg_status status = npg_json_read(&root, file, TEXT_MAX);
     if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
-    if (!status) status = load_root(rig, file, root);
+    if (!status && (status = load_root(rig, root)) == NPG_BAD_INPUT) npg_error_prefix(status, "%s", file);
     json_decref(root);
     return status;
 }

@@ -7,6 +7,7 @@
 #include "geometry/geometry.h"
 #include "ingest/rig/rig_internal.h"
 
+#define COMPARED    24     /* frames at most in which sensors are compared                      */
 #define SIGHTS_MAX  256    /* read at once: a rig of many sensors is measured in fewer frames   */
 #define SOURCES_MAX 1500   /* points of a sight that are looked up in the others for the overlap */
 #define SAME_SHIFT  0.001  /* of the depth: 2.5 mm at 2.5 m, about what rigs are calibrated to      */
@@ -115,8 +116,8 @@ static void tell(npg_rig_view *view, const npg_correction *c)
 typedef struct aligning {
     const npg_rig_sights *sights;
     npg_rig_view *views;
-    npg_correction of[NPG_RIG_SENSORS_MAX];
-    bool is_free[NPG_RIG_SENSORS_MAX];
+    npg_correction of[NPG_FRAME_SENSORS_MOST];
+    bool is_free[NPG_FRAME_SENSORS_MOST];
 } aligning;
 
 static void start(npg_correction *c)
@@ -182,8 +183,8 @@ npg_status npg_rig_compare(npg_rig *rig, npg_rig_view *views, const size_t *fram
     size_t most = SIGHTS_MAX / rig->sensor_count;
     memset(views, 0, rig->sensor_count * sizeof *views);
     for (size_t k = 0; k < rig->sensor_count; k++) npg_pose_identity(views[k].correction);
-    size_t chosen[NPG_RIG_COMPARED];
-    if (most > NPG_RIG_COMPARED) most = NPG_RIG_COMPARED;
+    size_t chosen[COMPARED];
+    if (most > COMPARED) most = COMPARED;
     if (most > count) most = count;
     for (size_t i = 0; i < most; i++) chosen[i] = frames[npg_spread_index(i, most, count)];
     NPG_TRY(npg_rig_sights_open(&sights, rig, chosen, most));

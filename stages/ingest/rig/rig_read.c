@@ -10,7 +10,7 @@
 typedef struct reading {
     npg_rig *rig;
     size_t frame;
-    npg_depth_points of[NPG_RIG_SENSORS_MAX];
+    npg_depth_points of[NPG_FRAME_SENSORS_MOST];
 } reading;
 
 static npg_status read_sensor(void *user, size_t s)
