@@ -1,7 +1,48 @@
-/* latent: the sparse sampling matrix and its kernels. */
+/* latent: the grid levels, the sparse sampling matrix and its kernels. */
 #include "kernels/latent.h"
 
+#include <assert.h>
+#include <math.h>
 #include <string.h>
+
+/* ---- the levels ---- */
+
+void npg_levels_add(npg_levels *levels, npg_level level)
+{
+    assert(levels->count < NPG_LEVELS_MAX && level.nodes >= 2);
+    level.first_row = levels->row_count;
+    level.row_count = (size_t)level.nodes * (size_t)level.nodes * (size_t)level.nodes;
+    levels->row_count += level.row_count;
+    levels->level[levels->count++] = level;
+}
+
+/* The eight nodes around a point (clamped to [-1, 1]^3) of a level and their trilinear weights:
+ * rows of the whole table. */
+static void sample_level(const npg_level *level, const float point[3], int32_t rows[NPG_CELL_NODES],
+                         float weights[NPG_CELL_NODES])
+{
+    size_t n = (size_t)level->nodes;
+    uint32_t cell[3];
+    float part[3];
+    for (int axis = 0; axis < 3; axis++) {
+        float last = (float)(level->nodes - 1);
+        float at = fminf(fmaxf((point[axis] + 1) * 0.5f * last, 0), last);
+        cell[axis] = (uint32_t)fminf(floorf(at), last - 1); /* the upper border belongs to the last cell */
+        part[axis] = at - (float)cell[axis];
+    }
+    /* Corner bits: x, y, z from the highest, so that rows of the table are met in order. */
+    for (int corner = 0; corner < NPG_CELL_NODES; corner++) {
+        uint32_t at[3];
+        float weight = (float)level->share;
+        for (int axis = 0; axis < 3; axis++) {
+            uint32_t up = (uint32_t)corner >> (2 - axis) & 1;
+            at[axis] = cell[axis] + up;
+            weight *= up ? part[axis] : 1 - part[axis];
+        }
+        rows[corner] = (int32_t)(level->first_row + (at[0] * n + at[1]) * n + at[2]);
+        weights[corner] = weight;
+    }
+}
 
 /* ---- the matrix ---- */
 
@@ -11,8 +52,8 @@ static void fill_row(npg_samples *samples, const npg_levels *levels, size_t row,
     for (int l = 0; l < levels->count; l++) {
         const npg_level *level = &levels->level[l];
         size_t at = row * samples->per_row + NPG_CELL_NODES * (size_t)l;
-        npg_level_sample(level, level->kind == NPG_LEVEL_NORMAL ? normal : position, samples->index + at,
-                         samples->weight + at);
+        sample_level(level, level->kind == NPG_LEVEL_NORMAL ? normal : position, samples->index + at,
+                     samples->weight + at);
     }
 }
 

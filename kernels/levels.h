@@ -33,13 +33,8 @@ typedef struct npg_levels {
     size_t row_count; /* of all levels */
 } npg_levels;
 
-/* Append a level; fills first_row and row_count. */
+/* Append a level; fills first_row and row_count.  Nodes lie at the corners of the cube ("align corners"); node
+ * (i, j, k) is row (i n + j) n + k. */
 void npg_levels_add(npg_levels *levels, npg_level level);
-
-/* The eight nodes around a point (clamped to [-1, 1]^3) of a level and their trilinear weights:
- * rows of the whole table.  Nodes lie at the corners of the cube ("align corners");
- * node (i, j, k) is row (i n + j) n + k. */
-void npg_level_sample(const npg_level *level, const float point[3], int32_t rows[NPG_CELL_NODES],
-                      float weights[NPG_CELL_NODES]);
 
 #endif

@@ -8,7 +8,8 @@
 
 /* ---- layout ---- */
 
-void npg_pack16(float *out, const float *points, size_t count, size_t padded)
+/* count x 3 -> blocks, padded to `padded` points (a multiple of 16) by repeating the last. */
+static void pack16(float *out, const float *points, size_t count, size_t padded)
 {
     for (size_t i = 0; i < padded; i++) {
         const float *from = points + 3 * (i < count ? i : count - 1);
@@ -16,7 +17,8 @@ void npg_pack16(float *out, const float *points, size_t count, size_t padded)
     }
 }
 
-size_t npg_tree_blocks(size_t count)
+/* Box blocks of the tree over `count` points. */
+static size_t tree_blocks(size_t count)
 {
     size_t total = 0, children = NPG_BLOCKS(count);
     do {
@@ -82,7 +84,7 @@ static npg_status upload_rest(npg_motion *m, npg_device *device, const float *ve
 {
     float *packed;
     NPG_TRY(npg_alloc_array(&packed, NPG_FOR_FIT, m->rows * 3, sizeof(float)));
-    npg_pack16(packed, vertices, m->real, m->rows);
+    pack16(packed, vertices, m->real, m->rows);
     npg_status status = npg_buffer_from(&m->rest, device, packed, m->rows * 3 * sizeof(float));
     npg_release(&packed);
     return status;
@@ -141,7 +143,7 @@ typedef struct totals {
 static void fill_slots(int32_t *forward, int32_t *reverse, const npg_motion *m, size_t t, size_t count,
                        const totals *before)
 {
-    const size_t vert_boxes = npg_tree_blocks(m->real);
+    const size_t vert_boxes = tree_blocks(m->real);
     const size_t vert_blocks = NPG_BLOCKS(m->rows);
     const int32_t f[NPG_SLOT] = {[NPG_SLOT_QUERIES] = (int32_t)m->real,
                                  [NPG_SLOT_QUERY_BLOCK] = (int32_t)(t * vert_blocks),
@@ -166,7 +168,7 @@ static npg_status upload_points(npg_motion *m, npg_device *device, const npg_tar
     NPG_TRY(npg_alloc_array(&packed, NPG_FOR_FIT, leaves * NPG_POINT_BLOCK, sizeof(float)));
     for (size_t t = 0; t < m->frames; t++) {
         size_t padded = NPG_PADDED(targets[t].count);
-        npg_pack16(packed + at, targets[t].points, targets[t].count, padded);
+        pack16(packed + at, targets[t].points, targets[t].count, padded);
         at += padded * 3;
     }
     npg_status status = npg_buffer_from(&m->points, device, packed, leaves * NPG_POINT_BLOCK * sizeof(float));
@@ -183,7 +185,7 @@ static npg_status upload_targets(npg_motion *m, npg_device *device, const npg_ta
     for (size_t t = 0; t < m->frames; t++) {
         fill_slots(slots, slots + m->frames * NPG_SLOT, m, t, targets[t].count, &sum);
         sum.leaves += NPG_BLOCKS(targets[t].count);
-        sum.boxes += npg_tree_blocks(targets[t].count);
+        sum.boxes += tree_blocks(targets[t].count);
         sum.points += targets[t].count;
         if (targets[t].count > m->most_points) m->most_points = targets[t].count;
     }
@@ -203,8 +205,7 @@ static npg_status open_moving(npg_motion *m, npg_device *device)
     const size_t f = sizeof(float), all = m->frames * m->rows;
     NPG_TRY(npg_buffer_open(&m->x, device, all * 3 * f));
     NPG_TRY(npg_buffer_open(&m->g, device, all * 3 * f));
-    NPG_TRY(
-        npg_buffer_open(&m->vert_boxes, device, m->frames * npg_tree_blocks(m->real) * NPG_BOX_BLOCK * f));
+    NPG_TRY(npg_buffer_open(&m->vert_boxes, device, m->frames * tree_blocks(m->real) * NPG_BOX_BLOCK * f));
     NPG_TRY(npg_buffer_open(&m->to_points, device, all * sizeof(int32_t)));
     NPG_TRY(npg_buffer_open(&m->cd, device, m->frames * f));
     NPG_TRY(npg_buffer_open(&m->part, device, all / NPG_LANES * f));

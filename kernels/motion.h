@@ -6,12 +6,6 @@
 #include "kernels/kernels.h"
 #include "kernels/layout.h"
 
-/* count x 3 -> blocks, padded to `padded` points (a multiple of 16) by repeating the last. */
-void npg_pack16(float *out, const float *points, size_t count, size_t padded);
-
-/* Box blocks of the tree over `count` points. */
-size_t npg_tree_blocks(size_t count);
-
 typedef struct npg_motion {
     npg_program *transform, *nearest, *chamfer, *isometry;
     size_t rows, real, frames;              /* V padded, V, T                                           */

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "pipeline/json_file.h"
 #include "pipeline/memory.h"
 #include "pipeline/source.h"
 #include "pipeline/stage.h"
@@ -288,6 +289,54 @@ static npg_status set_list_or_text(npg_options *options, const char *name, const
     return status;
 }
 
+/* ---- methods: a JSON object whose keys are options ---- */
+
+static npg_status set_key(npg_options *options, const char *name, const json_t *value);
+
+/* Errors name the object as `place`. */
+static npg_status apply_method(npg_options *options, const json_t *root, const char *place)
+{
+    const char *name;
+    json_t *value;
+    if (!json_is_object(root)) return npg_error(NPG_USAGE, "%s: not a JSON object", place);
+    json_object_foreach((json_t *)root, name, value)
+        NPG_TRY(npg_error_prefix(set_key(options, name, value), "%s", place));
+    return NPG_OK;
+}
+
+npg_status npg_options_load(npg_options *options, const char *path)
+{
+    enum { LIMIT = 1 << 20 }; /* bytes; all options together take a few thousand */
+    json_t *root;
+    NPG_REQUIRE(options && path);
+    NPG_TRY(npg_json_read(&root, path, LIMIT));
+    npg_status status = apply_method(options, root, path);
+    json_decref(root);
+    return status;
+}
+
+static npg_status apply_text(npg_options *options, const char *given)
+{
+    char *text;
+    json_t *root = NULL;
+    NPG_TRY(npg_copy_text(&text, given));
+    npg_status status = npg_json_parse(&root, text, "method");
+    if (!status) status = apply_method(options, root, "method");
+    npg_release(&text);
+    json_decref(root);
+    return status;
+}
+
+/* A path has a slash or a dot in it; anything else was meant as a name. */
+static npg_status set_method(npg_options *options, const char *value)
+{
+    if (value[strspn(value, " \t\r\n")] == '{') return apply_text(options, value);
+    if (strpbrk(value, "./")) return npg_options_load(options, value);
+    return npg_error(NPG_USAGE,
+                     "option method: \"%s\" is no method (neupig help method lists them), no file.json and "
+                     "no JSON object",
+                     value);
+}
 /* Whether a method's value is none of the names. */
 static bool is_method_text(const char *name, const char *value)
 {
@@ -300,11 +349,11 @@ static bool is_method_text(const char *name, const char *value)
 npg_status npg_options_set(npg_options *options, const char *name, const char *value)
 {
     NPG_REQUIRE(options && name && value);
-    return is_method_text(name, value) ? npg_method_set(options, value)
-                                       : set_list_or_text(options, name, value);
+    return is_method_text(name, value) ? set_method(options, value) : set_list_or_text(options, name, value);
 }
 
-npg_status npg_options_set_key(npg_options *options, const char *name, const json_t *value)
+/* Inside a method, which can only be one of the names there. */
+static npg_status set_key(npg_options *options, const char *name, const json_t *value)
 {
     char number[64];
     if (json_is_string(value)) return set_list_or_text(options, name, json_string_value(value));
@@ -322,9 +371,9 @@ npg_status npg_options_set_key(npg_options *options, const char *name, const jso
 
 npg_status npg_options_set_json(npg_options *options, const char *name, const json_t *value)
 {
-    if (strcmp(plain_name(name), "method") != 0) return npg_options_set_key(options, name, value);
+    if (strcmp(plain_name(name), "method") != 0) return set_key(options, name, value);
     if (json_is_string(value)) return npg_options_set(options, name, json_string_value(value));
-    return npg_method_apply(options, value, name);
+    return apply_method(options, value, name);
 }
 
 bool npg_options_is_set(const npg_options *options, const char *name)

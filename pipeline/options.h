@@ -123,9 +123,6 @@ bool npg_options_is_set(const npg_options *options, const char *name);
 struct json_t;
 npg_status npg_options_set_json(npg_options *options, const char *name, const struct json_t *value);
 
-/* The same, where a method can only be one of the names: inside a method. */
-npg_status npg_options_set_key(npg_options *options, const char *name, const struct json_t *value);
-
 /* Why there is no option of this name, and what to do instead; NULL when there never was one. */
 const char *npg_option_gone(const char *name);
 
@@ -135,15 +132,6 @@ npg_status npg_option_check(const npg_option *option, const char *text);
 /* The run's own options (npg_settings), and the named sets of values (stages/chain.c). */
 extern const npg_option npg_run_options[];
 extern const npg_preset npg_presets[];
-
-/* ---- methods: what the option "method" takes beside the names of npg_presets (method.c) ---- */
-
-/* Set options from a JSON object as text, or from a file of one.  The object holds options by their names
- * ("preset" is the method that they are added to).  NPG_USAGE names place and cause. */
-npg_status npg_method_set(npg_options *options, const char *value);
-
-/* The same for an object that was read; errors name it as `place`. */
-npg_status npg_method_apply(npg_options *options, const struct json_t *object, const char *place);
 
 /* ---- the word that a mistyped one was meant to be (nearest.c) ---- */
 

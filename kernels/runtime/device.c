@@ -2,13 +2,162 @@
 #include "kernels/runtime/device.h"
 
 #include <ctype.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
 
 #include "kernels/runtime/device_internal.h"
+#include "pipeline/child.h"
+#include "pipeline/file.h"
 
 #define CL_TRY(call) NPG_TRY(npg_cl_status(call, #call))
+
+/* ---- errors ---- */
+
+static const char *name_of(cl_int code)
+{
+    static const struct {
+        cl_int code;
+        const char *name;
+    } names[] = {
+        {-1, "CL_DEVICE_NOT_FOUND"},
+        {-2, "CL_DEVICE_NOT_AVAILABLE"},
+        {-3, "CL_COMPILER_NOT_AVAILABLE"},
+        {-4, "CL_MEM_OBJECT_ALLOCATION_FAILURE"},
+        {-5, "CL_OUT_OF_RESOURCES"},
+        {-6, "CL_OUT_OF_HOST_MEMORY"},
+        {-11, "CL_BUILD_PROGRAM_FAILURE"},
+        {-30, "CL_INVALID_VALUE"},
+        {-34, "CL_INVALID_CONTEXT"},
+        {-38, "CL_INVALID_MEM_OBJECT"},
+        {-45, "CL_INVALID_PROGRAM_EXECUTABLE"},
+        {-46, "CL_INVALID_KERNEL_NAME"},
+        {-48, "CL_INVALID_KERNEL"},
+        {-49, "CL_INVALID_ARG_INDEX"},
+        {-50, "CL_INVALID_ARG_VALUE"},
+        {-51, "CL_INVALID_ARG_SIZE"},
+        {-52, "CL_INVALID_KERNEL_ARGS"},
+        {-54, "CL_INVALID_WORK_GROUP_SIZE"},
+        {-55, "CL_INVALID_WORK_ITEM_SIZE"},
+        {-61, "CL_INVALID_BUFFER_SIZE"},
+        {-1001, "CL_PLATFORM_NOT_FOUND_KHR"},
+    };
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (names[i].code == code) return names[i].name;
+    return "OpenCL error";
+}
+
+npg_status npg_cl_status(cl_int code, const char *what)
+{
+    if (code == CL_SUCCESS) return NPG_OK;
+    bool is_memory = code == CL_MEM_OBJECT_ALLOCATION_FAILURE || code == CL_OUT_OF_RESOURCES ||
+                     code == CL_OUT_OF_HOST_MEMORY;
+    return npg_error(is_memory ? NPG_MEMORY : NPG_DEVICE, "%s: %s (%d)", what, name_of(code), code);
+}
+
+/* ---- where compiled kernels are kept ----
+ *
+ * PoCL's cache is not safe between processes and goes stale between versions, so each version of neupig has its own
+ * folders, numbered, and a process locks the first one that is free until it ends. */
+
+#define SLOTS 256 /* processes at work at the same time, at most */
+
+static unsigned long long hash_of_sources(void)
+{
+    XXH64_hash_t hash = 0;
+    for (const npg_kernel_source *source = npg_kernel_sources; source->name; source++)
+        hash = XXH64(source->text, strlen(source->text), hash);
+    return hash;
+}
+
+/* Compiled kernels are run: where others may put some of theirs is no place for them. */
+static bool is_own(const char *folder)
+{
+    struct stat info;
+    return !npg_make_folder(folder) && !lstat(folder, &info) && S_ISDIR(info.st_mode) &&
+           info.st_uid == getuid() && !(info.st_mode & S_IWOTH);
+}
+
+/* Lock the first folder below a base that no other process has, until this one ends. */
+static bool enter_below(const char *base)
+{
+    char folder[4096];
+    int fd;
+    if (!is_own(base)) return false;
+    for (int slot = 0; slot < SLOTS; slot++) {
+        snprintf(folder, sizeof folder, "%s/%s-%016llx/%d", base, npg_version(), hash_of_sources(), slot);
+        npg_status status = npg_file_lock(&fd, folder, "lock", false);
+        if (!status) return !setenv("POCL_CACHE_DIR", folder, 1);
+        if (fd >= 0) close(fd);
+        if (status != NPG_USAGE) return false;
+    }
+    return false;
+}
+
+/* A cache folder that the user has set (POCL_CACHE_DIR) is left alone.  NPG_DISK when no folder can be made. */
+static npg_status choose_folder(void)
+{
+    const char *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME"), *temp = getenv("TMPDIR");
+    char base[2048] = "";
+    if (getenv("POCL_CACHE_DIR")) return NPG_OK;
+    if (cache && cache[0] == '/')
+        snprintf(base, sizeof base, "%s/neupig", cache);
+    else if (home && home[0] == '/')
+        snprintf(base, sizeof base, "%s/.cache/neupig", home);
+    if (base[0] && enter_below(base)) return NPG_OK;
+    snprintf(base, sizeof base, "%s/neupig-%ld", temp && temp[0] == '/' ? temp : "/tmp", (long)getuid());
+    return enter_below(base) ? NPG_OK : npg_error(NPG_DISK, "%s: no place for compiled kernels", base);
+}
+
+/* ---- whether the drivers can be asked for their devices at all ---- */
+
+#define TIME_LIMIT_S 60 /* the first contact with a GPU that sleeps takes up to ten seconds */
+
+/* Where drivers read what processors, memory and devices there are: what of it is not here. */
+static const char *missing_mount(void)
+{
+    if (access("/sys/devices/system/cpu", R_OK | X_OK))
+        return "; /sys is not mounted here (mount -t sysfs sysfs /sys)";
+    if (access("/proc/self", R_OK | X_OK)) return "; /proc is not mounted here (mount -t proc proc /proc)";
+    return "";
+}
+
+/* In a process of its own (devices_main.c): a driver that can't work on a machine may end the process that asks, as
+ * PoCL does in a root without /sys, and a library must not end its host.  NPG_DEVICE with the driver's last line and
+ * what is missing; errors that a driver returns are left to the caller's own call. */
+static npg_status ask_drivers(void)
+{
+    npg_child_result answer;
+    npg_child_job job = {.program = "neupig-devices", .output_max = 4096, .time_limit_s = TIME_LIMIT_S};
+    npg_status status = npg_child_run(&answer, &job);
+    /* where the host ignores SIGCHLD the end of the answer is the only sign */
+    bool is_whole = !status && answer.output_size == strlen(NPG_PROBE_ANSWER) &&
+                    !memcmp(answer.output, NPG_PROBE_ANSWER, answer.output_size);
+    if (!status) npg_release(&answer.output);
+    if (!status && !is_whole)
+        status = npg_error(NPG_FAILED, "neupig-devices ended early: %s", answer.last_line);
+    if (status != NPG_FAILED) return status;
+    char cause[1024];
+    snprintf(cause, sizeof cause, "%s", npg_error_text());
+    return npg_error(NPG_DEVICE, "OpenCL can't list its devices%s: %s", missing_mount(), cause);
+}
+
+/* Before the first OpenCL call, once per process when all is well: about 30 ms. */
+static npg_status prepare(void)
+{
+    static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+    static bool is_ready;
+    pthread_mutex_lock(&lock);
+    npg_status status = is_ready ? NPG_OK : choose_folder();
+    if (!status && !is_ready) status = ask_drivers();
+    is_ready = !status;
+    pthread_mutex_unlock(&lock);
+    return status;
+}
 
 /* ---- finding devices ---- */
 
@@ -18,7 +167,7 @@ static npg_status all_devices(cl_device_id *ids, size_t *count)
     cl_platform_id platforms[NPG_PLATFORMS_MAX];
     cl_uint platform_count = 0, found;
     *count = 0;
-    NPG_TRY(npg_probe_drivers());
+    NPG_TRY(prepare());
     cl_int code = clGetPlatformIDs(NPG_PLATFORMS_MAX, platforms, &platform_count);
     if (code == CL_PLATFORM_NOT_FOUND_KHR || (!code && !platform_count))
         return npg_error(NPG_DEVICE,
@@ -61,7 +210,6 @@ npg_status npg_device_describe(size_t i, npg_device_info *info)
 {
     cl_device_id ids[NPG_DEVICES_MAX];
     size_t count;
-    NPG_TRY(npg_kernel_cache_enter());
     NPG_TRY(all_devices(ids, &count));
     return i < count ? read_facts(info, ids[i]) : NPG_END;
 }
@@ -123,7 +271,6 @@ static const npg_tuning *tuning_of_kind(const npg_device_info *info)
 static npg_status fill_device(npg_device *device, const char *spec, const npg_tuning *tuning)
 {
     cl_int code;
-    NPG_TRY(npg_kernel_cache_enter());
     NPG_TRY(choose_device(device, spec));
     device->tuning = tuning ? tuning : tuning_of_kind(&device->info);
     device->context = clCreateContext(NULL, 1, &device->id, NULL, NULL, &code);

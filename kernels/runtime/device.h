@@ -22,7 +22,7 @@ typedef struct npg_device_info {
 } npg_device_info;
 
 /* The i-th device of all platforms; NPG_END after the last, NPG_DEVICE when there is no platform at all
- * or a driver can't be asked (probe.c). */
+ * or a driver can't be asked. */
 npg_status npg_device_describe(size_t i, npg_device_info *info);
 
 /* Open a device.  spec: "auto" or "" (the first CPU device, else the first), "cpu", "gpu", its number in the

@@ -1,6 +1,6 @@
 /* neupig-devices: asks every OpenCL driver for its devices, in a process of its own,
  * because a driver may abort or hang there.  It prints one line when it has got through,
- * whatever errors the drivers returned (probe.c). */
+ * whatever errors the drivers returned (device.c). */
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* Programs and launches.
  *
  * A device owns the programs that were opened on it: the same text and constants are built once.  What a driver
- * keeps of them on disk is its own (kernel_cache.c): to hand it the texts again costs 0.2 processor seconds. */
+ * keeps of them on disk is its own (device.c): to hand it the texts again costs 0.2 processor seconds. */
 #include <stdio.h>
 #include <string.h>
 

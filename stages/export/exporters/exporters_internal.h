@@ -191,55 +191,6 @@ typedef struct npg_vdb_surface {
  * nothing of it is inside, so that no surface would come out; NPG_MEMORY. */
 npg_status npg_vdb_save_surface(const char *path, const npg_vdb_surface *surface);
 
-/* ---- the JSON part of a GLB with one animated mesh ---- */
-
-#define NPG_GLB_POSES 256 /* in one mesh: what WebGL2 holds for sure */
-
-typedef struct npg_glb_range { /* of an accessor */
-    float lo[3], hi[3];
-} npg_glb_range;
-
-/* The binary part, in this order, every piece at a multiple of 4:
- *
- *     indices 3F uint32 | base positions G float3 | base normals | colours G uint16x4 | uvs G float2 |
- *     per further pose: position deltas G float3, normal deltas | times T float | weights T (T - 1) float */
-typedef struct npg_glb_layout {
-    const npg_export_facts *facts;
-    size_t vert_count;         /* G                                  */
-    size_t pose_count;         /* T of this mesh, NPG_GLB_POSES most */
-    int64_t first_index;       /* of its frames                      */
-    int64_t segment, segments; /* which of how many files            */
-    bool has_uvs;
-    npg_glb_range base, delta[NPG_GLB_POSES]; /* delta[0] is not used        */
-    float times[NPG_GLB_POSES];               /* seconds from the first pose */
-} npg_glb_layout;
-
-/* Of the binary part. */
-uint64_t npg_glb_bytes(const npg_glb_layout *layout);
-
-/* The JSON, padded with blanks to *length bytes; 0: to as many as it takes when ranges and times are known,
- * too, so that they can be put in when all is written.  To be given to npg_release(). */
-npg_status npg_glb_text(char **text, size_t *length, const npg_glb_layout *layout);
-
-/* ---- scenes to draw: a mesh, or a cloud as small balls, with colours ---- */
-
-typedef struct npg_scene {
-    npg_mesh *mesh;      /* what rays meet, with vertex normals; owned              */
-    float *colours;      /* V x 3, 0..1, owned                                      */
-    bool is_cloud;       /* each 8 faces are a ball                                 */
-    size_t shown, total; /* clouds: points drawn and points there                   */
-} npg_scene;
-
-/* Read only what a file fills of the space, along three axes (rows of unit length); points that are not
- * finite are left out.  Added to *reach. */
-npg_status npg_scene_measure(npg_bounds *reach, const char *path, npg_origin *origin, const double axes[9]);
-
-/* Read a file to draw it.  ball_radius: of a cloud's points, in the file's unit.  first: the mesh whose
- * positions give the identity colours (NULL: this one's own); used when the vertex counts are equal. */
-npg_status npg_scene_open(npg_scene *scene, const char *path, npg_origin *origin, double ball_radius,
-                          npg_picture_colour colour, const npg_mesh *first);
-void npg_scene_close(npg_scene *scene);
-
 /* ---- colours ---- */
 
 /* 0 .. 1, linear light, of sRGB as cameras and scanners write it (IEC 61966-2-1). */

@@ -26,35 +26,22 @@ typedef struct exporters_pass {
 
 /* ---- what earlier runs left ---- */
 
-static bool has_ending(const char *name, const char *const *endings)
-{
-    const char *dot = strrchr(name, '.');
-    for (; dot && *endings; endings++)
-        if (!strcmp(dot, *endings)) return true;
-    return false;
-}
-
-/* "motion.<ending>", "motion_000.<ending>". */
-static bool is_single(const char *name)
-{
-    static const char *const endings[] = {".pc2", ".mdd", ".glb", ".usda", ".npz", NULL};
-    if (strncmp(name, "motion", 6) != 0 || !has_ending(name, endings)) return false;
-    const char *rest = name + 6;
-    size_t digits = *rest == '_' ? strspn(rest + 1, "0123456789") : 0;
-    if (digits) rest += 1 + digits;
-    return rest == strrchr(name, '.');
-}
-
 typedef struct clearing {
     const char *folder;
     bool is_output; /* the results' folder itself; else one of numbered files */
 } clearing;
 
+/* Also "motion_000.glb". */
 static bool is_ours(const clearing *c, const char *name)
 {
     int64_t number;
+    int end = 0;
     if (!c->is_output) return npg_mesh_name_read(name, ".obj .vdb ", &number);
-    return is_single(name) || !strcmp(name, "reference.obj") || !strcmp(name, "exports.jsonl");
+    for (int i = 0; npg_exporters[i]; i++)
+        if (npg_exporters[i]->file && !strcmp(npg_exporters[i]->file, name)) return true;
+    sscanf(name, "motion_%*[0-9].glb%n", &end);
+    return (end && !name[end]) || !strcmp(name, "motion.glb") || !strcmp(name, "reference.obj") ||
+           !strcmp(name, "exports.jsonl");
 }
 
 /* Also what a killed run left half-written (pipeline/file.h): ".<name>.part". */

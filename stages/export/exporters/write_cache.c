@@ -38,16 +38,15 @@ static uint64_t bytes(const npg_export_facts *facts)
 
 static npg_status open_pc2(void *state)
 {
-    cache *c = state;
-    const npg_export_facts *facts = c->writer.facts;
+    const npg_writer *writer = state;
+    const npg_export_facts *facts = writer->facts;
     unsigned char header[32] = "POINTCACHE2";
-    NPG_TRY(npg_alloc_array(&c->row, NPG_FOR_FILES, facts->vert_count, 12));
     npg_put_little(header + 12, 1, 4);
     npg_put_little(header + 16, facts->vert_count, 4);
     npg_put_little(header + 20, npg_float_bits((float)facts->first_index), 4);
     npg_put_little(header + 24, npg_float_bits(1), 4);
     npg_put_little(header + 28, (uint64_t)frames_of(facts), 4);
-    return npg_file_write(c->writer.file, header, sizeof header);
+    return npg_file_write(writer->file, header, sizeof header);
 }
 
 static npg_status open_mdd(void *state)
@@ -65,21 +64,19 @@ static npg_status open_mdd(void *state)
     return NPG_OK;
 }
 
-static npg_status write_row(cache *c, const npg_pose *pose, size_t (*put)(unsigned char *, uint64_t, size_t))
-{
-    size_t count = 3 * c->writer.facts->vert_count;
-    for (size_t i = 0; i < count; i++) put(c->row + 4 * i, npg_float_bits(pose->pos[i]), 4);
-    return npg_file_write(c->writer.file, c->row, 4 * count);
-}
-
+/* As they stand in memory: the machines this runs on are little-endian. */
 static npg_status write_pc2(void *state, const npg_pose *pose)
 {
-    return write_row(state, pose, npg_put_little);
+    const npg_writer *writer = state;
+    return npg_file_write(writer->file, pose->pos, 12 * writer->facts->vert_count);
 }
 
 static npg_status write_mdd(void *state, const npg_pose *pose)
 {
-    return write_row(state, pose, npg_put_big);
+    cache *c = state;
+    size_t count = 3 * c->writer.facts->vert_count;
+    for (size_t i = 0; i < count; i++) npg_put_big(c->row + 4 * i, npg_float_bits(pose->pos[i]), 4);
+    return npg_file_write(c->writer.file, c->row, 4 * count);
 }
 
 static void close_cache(void *state)
@@ -92,12 +89,11 @@ const npg_exporter npg_exporter_pc2 = {.name = "pc2",
                                        .is_float = true,
                                        .has_fixed_rate = true,
                                        .with_reference = true,
-                                       .state_size = sizeof(cache),
+                                       .state_size = sizeof(npg_writer),
                                        .check = check,
                                        .bytes = bytes,
                                        .open = open_pc2,
-                                       .pose = write_pc2,
-                                       .close = close_cache};
+                                       .pose = write_pc2};
 
 const npg_exporter npg_exporter_mdd = {.name = "mdd",
                                        .file = "motion.mdd",
