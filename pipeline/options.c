@@ -58,15 +58,18 @@ static const npg_option *find_option(const npg_options *options, const char *nam
     return NULL;
 }
 
+npg_option_info npg_option_info_of(const npg_option *o, const char *stage)
+{
+    return (npg_option_info){sizeof(npg_option_info), stage,   o->name, o->help, o->default_text, o->choices,
+                             o->value_name,           o->type, o->min,  o->max,  o->use};
+}
+
 npg_status npg_options_describe(size_t i, npg_option_info *info)
 {
     const char *stage;
     npg_option_info known = {.struct_size = sizeof known};
     const npg_option *option = npg_option_at(i, &stage);
-    if (option)
-        known = (npg_option_info){sizeof known,         stage,           option->name,       option->help,
-                                  option->default_text, option->choices, option->value_name, option->type,
-                                  option->min,          option->max,     option->use};
+    if (option) known = npg_option_info_of(option, stage);
     NPG_TRY(npg_struct_give(info, &known, sizeof known, NPG_SIZE_UP_TO(npg_option_info, max), "info"));
     return option ? NPG_OK : NPG_END;
 }

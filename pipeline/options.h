@@ -116,6 +116,9 @@ const npg_custom_stage *npg_options_custom_stage(const npg_options *options, siz
 #define NPG_CUSTOM_STAGES_MAX 6
 npg_status npg_custom_check(const npg_custom_stage *given, const struct npg_stage *const *chain);
 
+/* A row of a table as its description. */
+npg_option_info npg_option_info_of(const npg_option *option, const char *stage);
+
 /* Whether the user (not a preset, not the default) set it. */
 bool npg_options_is_set(const npg_options *options, const char *name);
 

@@ -5,26 +5,10 @@
 
 #include "pipeline/memory.h"
 #include "pipeline/options.h"
-#include "tools/help.h"
 
 enum { NAME_LIMIT = 64 };
 
 /* ---- options of a verb ---- */
-
-static npg_option_info info_of(const npg_option *option, const char *group)
-{
-    return (npg_option_info){sizeof(npg_option_info),
-                             group,
-                             option->name,
-                             option->help,
-                             option->default_text,
-                             option->choices,
-                             option->value_name,
-                             option->type,
-                             option->min,
-                             option->max,
-                             option->use};
-}
 
 static const npg_option *own_option(const npg_verb *verb, const char *name)
 {
@@ -55,7 +39,7 @@ static bool find_in_run(npg_option_info *info, const char *name)
 static bool find_option(npg_option_info *info, const npg_verb *verb, const char *name)
 {
     const npg_option *own = own_option(verb, name);
-    if (own) *info = info_of(own, verb->name);
+    if (own) *info = npg_option_info_of(own, verb->name);
     return own || (verb->with_run_options && find_in_run(info, name) && info->use == NPG_USE_COMMON);
 }
 
@@ -103,7 +87,7 @@ npg_status npg_cli_option(npg_option_info *info, bool *is_short, const npg_verb 
     }
     for (const npg_option *option = verb->options; option && option->name; option++)
         if (i-- == 0) {
-            *info = info_of(option, verb->name);
+            *info = npg_option_info_of(option, verb->name);
             if (is_short) *is_short = true;
             return NPG_OK;
         }
@@ -166,45 +150,46 @@ static npg_status set_option(npg_cli *cli, const char *name, const char *value)
     return NPG_OK;
 }
 
-/* The option at argv[*i], which begins with two dashes. */
-static npg_status parse_long_option(npg_cli *cli, int argc, char **argv, int *i)
+/* The name of the option that text begins with, and the value that stands in the same word, or NULL. */
+static npg_status split_option(char *name, const char **value, const char *text)
+{
+    static const char *const shorts[] = {"output", "quiet", "verbose"};
+    const char *equals = strchr(text, '=');
+    *value = NULL;
+    *name = 0;
+    if (text[1] != '-') {
+        for (size_t s = 0; s < sizeof shorts / sizeof *shorts; s++)
+            if (text[1] == *shorts[s]) strcpy(name, shorts[s]);
+        if (text[2]) *value = text + 2;
+        return NPG_OK;
+    }
+    size_t length = equals ? (size_t)(equals - text - 2) : strlen(text + 2);
+    if (length >= NAME_LIMIT) return npg_error(NPG_USAGE, "there is no option %.*s", (int)length + 2, text);
+    memcpy(name, text + 2, length);
+    name[length] = 0;
+    if (equals) *value = equals + 1;
+    return NPG_OK;
+}
+
+/* The option at argv[*i], which begins with a dash. */
+static npg_status parse_option(npg_cli *cli, int argc, char **argv, int *i)
 {
     char name[NAME_LIMIT];
     npg_option_info info;
-    const char *text = argv[*i] + 2, *equals = strchr(text, '=');
-    size_t length = equals ? (size_t)(equals - text) : strlen(text);
-    if (length >= sizeof name) return npg_error(NPG_USAGE, "there is no option --%.*s", (int)length, text);
-    memcpy(name, text, length);
-    name[length] = 0;
+    const char *text = argv[*i], *value;
+    NPG_TRY(split_option(name, &value, text));
     if (find_option(&info, cli->verb, name)) {
-        if (equals) return set_option(cli, name, equals + 1);
-        if (info.type == NPG_OPTION_FLAG) return set_option(cli, name, "yes");
-        if (*i + 1 >= argc) return npg_error(NPG_USAGE, "option --%s needs a value", name);
-        return set_option(cli, name, argv[++*i]);
+        if (!value && info.type == NPG_OPTION_FLAG) value = "yes";
+        if (!value && *i + 1 < argc) value = argv[++*i];
+        return value ? set_option(cli, name, value) : npg_error(NPG_USAGE, "option %s needs a value", text);
     }
-    if (!strncmp(name, "no-", 3) && find_option(&info, cli->verb, name + 3) && info.type == NPG_OPTION_FLAG) {
-        if (equals) return npg_error(NPG_USAGE, "option --%s takes no value", name);
-        return set_option(cli, name + 3, "no");
-    }
-    return unknown_option(cli->verb, name, equals ? equals + 1 : *i + 1 < argc ? argv[*i + 1] : NULL);
-}
-
-static npg_status parse_short_option(npg_cli *cli, int argc, char **argv, int *i)
-{
-    static const struct {
-        char letter;
-        const char *name;
-    } shorts[] = {{'o', "output"}, {'q', "quiet"}, {'v', "verbose"}};
-    const char *text = argv[*i];
-    npg_option_info info;
-    for (size_t s = 0; s < sizeof shorts / sizeof *shorts; s++) {
-        if (text[1] != shorts[s].letter || !find_option(&info, cli->verb, shorts[s].name)) continue;
-        if (info.type == NPG_OPTION_FLAG && !text[2]) return set_option(cli, info.name, "yes");
-        if (text[2]) return set_option(cli, info.name, text + 2);
-        if (*i + 1 >= argc) return npg_error(NPG_USAGE, "option -%c needs a value", text[1]);
-        return set_option(cli, info.name, argv[++*i]);
-    }
-    return npg_error(NPG_USAGE, "there is no option %s (neupig help %s lists them)", text, cli->verb->name);
+    if (text[1] != '-')
+        return npg_error(NPG_USAGE, "there is no option %s (neupig help %s lists them)", text,
+                         cli->verb->name);
+    if (!strncmp(name, "no-", 3) && find_option(&info, cli->verb, name + 3) && info.type == NPG_OPTION_FLAG)
+        return value ? npg_error(NPG_USAGE, "option --%s takes no value", name)
+                     : set_option(cli, name + 3, "no");
+    return unknown_option(cli->verb, name, value ? value : *i + 1 < argc ? argv[*i + 1] : NULL);
 }
 
 /* Read what --method says, before anything else on the command line is set. */
@@ -228,10 +213,8 @@ static npg_status parse_all(npg_cli *cli, int argc, char **argv)
             cli->operands[cli->operand_count++] = text;
         else if (!strcmp(text, "--"))
             only_operands = true;
-        else if (text[1] == '-')
-            NPG_TRY(parse_long_option(cli, argc, argv, &i));
         else
-            NPG_TRY(parse_short_option(cli, argc, argv, &i));
+            NPG_TRY(parse_option(cli, argc, argv, &i));
     }
     return NPG_OK;
 }

@@ -1,5 +1,5 @@
 /* Help: the options of a verb, the keys of the method, and both as JSON, from the tables. */
-#include "tools/help.h"
+#include "tools/cli.h"
 
 #include <jansson.h>
 #include <string.h>

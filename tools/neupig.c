@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "pipeline/options.h"
-#include "tools/help.h"
+#include "tools/cli.h"
 
 const npg_verb npg_verbs[] = {
     {"run", "INPUT -o DIR", 0, 1, "Turn a capture into a moving mesh",

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/uio.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -55,38 +56,25 @@ static void spell_now(char *text, size_t size)
     snprintf(text + length, size - length, ".%03ldZ", now.tv_nsec / 1000000);
 }
 
-static char *spell_line(json_t *record)
-{
-    char now[40];
-    spell_now(now, sizeof now);
-    json_t *line = json_pack("{s:s}", "time", now);
-    if (line) json_object_update(line, record);
-    char *text = json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(6)), *grown = NULL;
-    json_decref(line);
-    size_t length = text ? strlen(text) : 0;
-    if (text) grown = realloc(text, length + 2);
-    if (!grown) {
-        free(text);
-        return NULL;
-    }
-    memcpy(grown + length, "\n", 2);
-    return grown;
-}
-
 void npg_log_file_write(int *fd, json_t *record)
 {
-    char *line = *fd >= 0 && record ? spell_line(record) : NULL;
-    if (line) {
-        size_t length = strlen(line);
-        ssize_t written = write(*fd, line, length);
-        if (written != (ssize_t)length) {
+    char now[40], newline[] = "\n";
+    spell_now(now, sizeof now);
+    json_t *line = *fd >= 0 && record ? json_pack("{s:s}", "time", now) : NULL;
+    if (line) json_object_update(line, record);
+    char *text = line ? json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(6)) : NULL;
+    if (text) {
+        const struct iovec whole[] = {{text, strlen(text)}, {newline, 1}};
+        ssize_t written = writev(*fd, whole, 2);
+        if (written != (ssize_t)whole[0].iov_len + 1) {
             fprintf(stderr, "neupig: the log file can't be written any more: %s\n",
                     written < 0 ? strerror(errno) : "no room for a whole line");
             close(*fd);
             *fd = -1;
         }
     }
-    free(line);
+    free(text);
+    json_decref(line);
     json_decref(record);
 }
 

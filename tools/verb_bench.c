@@ -49,7 +49,8 @@ typedef struct bench {
     settings s;
     json_t *rows;
     npg_arena arena;
-    npg_mesh *mesh;      /* the figure in the first frame, unit coordinates */
+    npg_moving figure;
+    npg_mesh *mesh;      /* its, as it is in the first frame, unit coordinates */
     float **poses;       /* T: its vertices in each frame                   */
     npg_scanned *clouds; /* T                                               */
     npg_device *device;  /* kernels */
@@ -59,6 +60,7 @@ typedef struct bench {
     npg_surface *surface; /* closest */
     npg_surface_hit *hits;
     npg_tracker *tracker; /* track */
+    double *pose;
     npg_energy *energy;
     npg_energy_frame *window;
     float *ways;
@@ -70,29 +72,21 @@ static npg_status open_figure(bench *b)
 {
     enum { SURFACE = 9 }; /* triangles' vertices in a square metre cell of the figure, measured */
     const size_t count = (size_t)b->s.frames;
-    npg_body body = {0};
     npg_scan scan = {.point_count = b->s.points, .noise = 0.1, .diagonal = 2};
-    npg_status status = npg_walker.open(&body, sqrt(SURFACE / (double)b->s.vertices), false);
-    if (!status) status = npg_mesh_copy(&b->mesh, body.rest);
+    b->figure.kind = &npg_walker;
+    NPG_TRY(npg_moving_open(&b->figure, sqrt(SURFACE / (double)b->s.vertices), false));
+    npg_mesh *m = b->mesh = b->figure.mesh;
     b->poses = npg_arena_take(&b->arena, count, sizeof *b->poses);
     b->clouds = npg_arena_take(&b->arena, count, sizeof *b->clouds);
-    if (!status) status = npg_arena_status(&b->arena);
-    size_t verts = status ? 0 : b->mesh->vert_count;
-    if (!status) status = npg_alloc_array(&b->mesh->vert_normals, NPG_FOR_MESH, verts, 3 * sizeof(float));
-    for (size_t t = count; t-- && !status;) { /* the mesh stays as it is in the first frame */
-        const npg_moment moment = {.phase = (double)t / (double)count};
-        npg_mesh *m = b->mesh;
-        npg_walker.pose(&body, m->vert_pos, &moment);
-        for (size_t v = 0; v < verts; v++) m->vert_pos[3 * v + 1] -= 0.9f; /* its middle */
-        npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, verts, m->faces, m->face_count);
-        b->poses[t] = npg_arena_take(&b->arena, 3 * verts, sizeof(float));
-        status = npg_arena_status(&b->arena);
-        if (!status) memcpy(b->poses[t], m->vert_pos, 3 * verts * sizeof(float));
-        if (!status) status = npg_scan_frame(&b->clouds[t], &scan, m, t);
+    NPG_TRY(npg_arena_status(&b->arena));
+    for (size_t t = count; t--;) { /* the mesh stays as it is in the first frame */
+        npg_moving_pose(&b->figure, &(npg_moment){.phase = (double)t / (double)count});
+        for (size_t v = 0; v < m->vert_count; v++) m->vert_pos[3 * v + 1] -= 0.9f; /* its middle */
+        b->poses[t] = npg_arena_copy(&b->arena, m->vert_pos, m->vert_count, 3 * sizeof(float));
+        NPG_TRY(npg_arena_status(&b->arena));
+        NPG_TRY(npg_scan_frame(&b->clouds[t], &scan, m, t));
     }
-    npg_mesh_unref(&body.rest);
-    npg_release(&body.weights);
-    return status;
+    return NPG_OK;
 }
 
 /* ---- kernels: decoder, and what follows it, of one batch of frames ---- */
@@ -159,21 +153,18 @@ static npg_status closest(bench *b)
 static npg_status open_tracker(bench *b)
 {
     static const npg_tracker_settings usual = {1600, 5000, 12, 0.006, 0.001};
-    return npg_tracker_open(&b->tracker, b->mesh, &usual);
+    NPG_TRY(npg_tracker_open(&b->tracker, b->mesh, &usual));
+    b->pose = npg_arena_take(&b->arena, npg_pose_bytes(npg_tracker_node_count(b->tracker)), 1);
+    return npg_arena_status(&b->arena);
 }
 
 /* From the first frame's pose to the second. */
 static npg_status track(bench *b)
 {
     npg_tracked tracked;
-    double *pose;
     const npg_tracker_cloud cloud = {.points = b->clouds[1].pos, .count = b->clouds[1].count};
-    size_t nodes = npg_tracker_node_count(b->tracker);
-    NPG_TRY(npg_alloc(&pose, NPG_FOR_RUN, npg_pose_bytes(nodes)));
-    npg_pose_rest(pose, nodes);
-    npg_status status = npg_tracker_fit(b->tracker, &tracked, pose, &cloud, NULL, NULL);
-    npg_release(&pose);
-    return status;
+    npg_pose_rest(b->pose, npg_tracker_node_count(b->tracker));
+    return npg_tracker_fit(b->tracker, &tracked, b->pose, &cloud, NULL, NULL);
 }
 
 static const npg_solver_settings usual_joint = {.epochs = 60, .energy = {.points = 5000, .shape = 0.1}};
@@ -256,25 +247,22 @@ static npg_status time_row(bench *b, const struct row *row)
     const double least_s = 8e-3; /* shorter calls are taken several times for one figure */
     size_t calls = 1, count = (size_t)b->s.repeat;
     npg_busy took;
-    double *wall_s, *cpu_s;
+    double *wall_s = npg_arena_take(&b->arena, count, sizeof *wall_s);
+    double *cpu_s = npg_arena_take(&b->arena, count, sizeof *cpu_s);
+    NPG_TRY(npg_arena_status(&b->arena));
     if (row->open) NPG_TRY(row->open(b));
     NPG_TRY(call_row(&took, b, row, 1)); /* the first may build */
     NPG_TRY(call_row(&took, b, row, 1));
     if (took.wall_s < least_s) calls = (size_t)(least_s / fmax(took.wall_s, 1e-6)) + 1;
-    NPG_TRY(npg_alloc_array(&wall_s, NPG_FOR_RUN, 2 * count, sizeof *wall_s));
-    cpu_s = wall_s + count;
-    npg_status status = NPG_OK;
-    for (size_t i = 0; i < count && !status; i++) {
-        status = call_row(&took, b, row, calls);
+    for (size_t i = 0; i < count; i++) {
+        NPG_TRY(call_row(&took, b, row, calls));
         wall_s[i] = took.wall_s;
         cpu_s[i] = took.cpu_s;
     }
-    if (!status)
-        json_object_set_new(
-            b->rows, row->name,
-            json_pack("{s:f, s:f}", "wall_s", median(wall_s, count), "process_cpu_s", median(cpu_s, count)));
-    npg_release(&wall_s);
-    return status;
+    json_object_set_new(
+        b->rows, row->name,
+        json_pack("{s:f, s:f}", "wall_s", median(wall_s, count), "process_cpu_s", median(cpu_s, count)));
+    return NPG_OK;
 }
 
 static npg_status measure(bench *b)
@@ -323,7 +311,7 @@ static void close_bench(bench *b)
     npg_mlp_close(&b->mlp);
     npg_device_close(&b->device);
     for (int64_t t = 0; b->clouds && t < b->s.frames; t++) npg_scanned_close(&b->clouds[t]);
-    npg_mesh_unref(&b->mesh);
+    npg_moving_close(&b->figure);
     npg_arena_release(&b->arena);
     json_decref(b->rows);
 }

@@ -54,34 +54,24 @@ static npg_status list_devices(json_t *list)
 
 /* ---- libraries ---- */
 
-static void set_text(json_t *object, const char *name, const char *text)
+static json_t *version_of(int major, int minor, int patch)
 {
-    json_object_set_new(object, name, json_string(text));
-}
-
-static void set_version(json_t *object, const char *name, int major, int minor, int patch)
-{
-    json_object_set_new(object, name, json_sprintf("%d.%d.%d", major, minor, patch));
+    return json_sprintf("%d.%d.%d", major, minor % 100, patch % 100);
 }
 
 static json_t *list_libraries(void)
 {
-    json_t *list = json_object();
     RTCDevice embree = rtcNewDevice(NULL);
     int version = embree ? (int)rtcGetDeviceProperty(embree, RTC_DEVICE_PROPERTY_VERSION) : 0;
-    set_text(list, "neupig", npg_version());
-    set_version(list, "embree", version / 10000, version / 100 % 100, version % 100);
+    int xxhash = (int)XXH_versionNumber();
     if (embree) rtcReleaseDevice(embree);
-    set_text(list, "pcl", NPG_PCL_VERSION); /* neupig-poisson has it */
-    set_text(list, "openvdb", NPG_OPENVDB_VERSION);
-    set_version(list, "meshoptimizer", MESHOPTIMIZER_VERSION / 1000, MESHOPTIMIZER_VERSION / 10 % 100,
-                MESHOPTIMIZER_VERSION % 10);
-    set_text(list, "jansson", jansson_version_str());
-    set_text(list, "libpng", png_get_libpng_ver(NULL));
-    set_text(list, "zstd", ZSTD_versionString());
-    unsigned xxhash = XXH_versionNumber();
-    set_version(list, "xxhash", (int)xxhash / 10000, (int)xxhash / 100 % 100, (int)xxhash % 100);
-    return list;
+    return json_pack(
+        "{s:s,s:o,s:s,s:s,s:o,s:s,s:s,s:s,s:o}", "neupig", npg_version(), "embree",
+        version_of(version / 10000, version / 100, version), "pcl",
+        NPG_PCL_VERSION /* neupig-poisson has it */, "openvdb", NPG_OPENVDB_VERSION, "meshoptimizer",
+        version_of(MESHOPTIMIZER_VERSION / 1000, MESHOPTIMIZER_VERSION / 10, MESHOPTIMIZER_VERSION % 10),
+        "jansson", jansson_version_str(), "libpng", png_get_libpng_ver(NULL), "zstd", ZSTD_versionString(),
+        "xxhash", version_of(xxhash / 10000, xxhash / 100, xxhash));
 }
 
 static json_t *describe_machine(void)

@@ -40,20 +40,10 @@ const npg_option npg_eval_options[] = {
 
 static json_t *json_of_figures(const npg_eval_figures *m)
 {
-    const struct {
-        const char *name;
-        double value;
-    } figures[] = {{"CD", m->cd},
-                   {"CD_pred_to_gt", m->cd_to_truth},
-                   {"CD_gt_to_pred", m->cd_from_truth},
-                   {"NC", m->nc},
-                   {"F", m->f},
-                   {"precision", m->precision},
-                   {"recall", m->recall}};
-    json_t *object = json_object();
-    for (size_t i = 0; i < sizeof figures / sizeof *figures; i++)
-        json_object_set_new(object, figures[i].name, npg_json_real(figures[i].value));
-    return object;
+    return json_pack("{so so so so so so so}", "CD", npg_json_real(m->cd), "CD_pred_to_gt",
+                     npg_json_real(m->cd_to_truth), "CD_gt_to_pred", npg_json_real(m->cd_from_truth), "NC",
+                     npg_json_real(m->nc), "F", npg_json_real(m->f), "precision", npg_json_real(m->precision),
+                     "recall", npg_json_real(m->recall));
 }
 
 typedef struct told {
@@ -77,21 +67,16 @@ static void tell_frame(void *user, const npg_eval_figures *m)
 static void print_json(const npg_eval_figures *e, const told *t)
 {
     json_t *object = json_of_figures(e);
-    json_t *more =
-        json_pack("{sI sI sI sI sI sI sb}", "frames", (json_int_t)e->frames, "samples",
+    json_object_update_new(
+        object,
+        json_pack("{sI sI sI sI sI sI sb so so so so so so so}", "frames", (json_int_t)e->frames, "samples",
                   (json_int_t)t->s->samples, "pred_vertices", (json_int_t)e->vertices, "pred_faces",
                   (json_int_t)e->faces, "gt_vertices", (json_int_t)e->truth_vertices, "gt_faces",
-                  (json_int_t)e->truth_faces, "pred_constant_topology", e->constant_topology);
-    json_object_set_new(more, "tau", npg_json_real(t->s->tau));
-    json_object_set_new(more, "diagonal", npg_json_real(e->diagonal));
-    json_object_set_new(more, "Corr", npg_json_real(e->corr));
-    json_object_set_new(more, "jitter", npg_json_real(e->jitter));
-    json_object_set_new(more, "edge", npg_json_real(e->edge));
-    json_object_set_new(more, "rigidity", npg_json_real(e->rigidity));
-    json_object_set_new(more, "bad_area", npg_json_real(e->bad_area));
-    json_object_update(object, more);
+                  (json_int_t)e->truth_faces, "pred_constant_topology", e->constant_topology, "tau",
+                  npg_json_real(t->s->tau), "diagonal", npg_json_real(e->diagonal), "Corr",
+                  npg_json_real(e->corr), "jitter", npg_json_real(e->jitter), "edge", npg_json_real(e->edge),
+                  "rigidity", npg_json_real(e->rigidity), "bad_area", npg_json_real(e->bad_area)));
     json_object_set(object, "per_frame", t->frames);
-    json_decref(more);
     npg_cli_print(object);
 }
 

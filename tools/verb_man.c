@@ -1,7 +1,7 @@
 /* neupig man: the manual page, made from the tables of options. */
 #include <string.h>
 
-#include "tools/help.h"
+#include "tools/cli.h"
 
 /* Text as roff shows it letter by letter. */
 static void put_text(const char *text)

@@ -11,10 +11,10 @@
 typedef struct settings {
     const char *output;
     int format;
-    int64_t frames, points, holes, cameras, width, height, seed;
-    double cell, cycles, travel, noise, outliers;
-    bool vary, normals, rig;
-    double depth_noise_mm;
+    int64_t frames;
+    npg_scan scan; /* without what the first frame gives */
+    double cell, cycles, travel, depth_noise_mm;
+    bool normals, rig;
 } settings;
 
 #define AT(member) offsetof(settings, member)
@@ -26,7 +26,7 @@ const npg_option npg_synth_options[] = {
         "Folder for points/ and truth/ (also -o)"),
     NPG_ROW_INT   ("frames",   AT(frames),   "24",     1,     1e6,          NULL,
         "Frames"),
-    NPG_ROW_INT   ("points",   AT(points),   "5000",   1,     1e8,          NULL,
+    NPG_ROW_INT   ("points",   AT(scan.point_count), "5000",   1,     1e8,          NULL,
         "Points per frame"),
     NPG_ROW_REAL  ("cycles",   AT(cycles),   "1",      0,     1e4,          NULL,
         "Cycles of the motion over all frames"),
@@ -34,21 +34,21 @@ const npg_option npg_synth_options[] = {
         "Metres the walker goes forward per cycle"),
     NPG_ROW_REAL  ("cell",     AT(cell),     "0.025",  0.004, 0.06,         "M",
         "Size of the truth mesh's triangles, metres"),
-    NPG_ROW_REAL  ("noise",    AT(noise),    "0",      0,     10,           "PERCENT",
+    NPG_ROW_REAL  ("noise",    AT(scan.noise), "0",      0,     10,           "PERCENT",
         "Gaussian noise, deviation in % of the diagonal; along the rays with cameras"),
-    NPG_ROW_REAL  ("outliers", AT(outliers), "0",      0,     90,           "PERCENT",
+    NPG_ROW_REAL  ("outliers", AT(scan.outliers), "0",      0,     90,           "PERCENT",
         "Share of points replaced by points anywhere in the box, in %"),
-    NPG_ROW_INT   ("holes",    AT(holes),    "0",      0,     1000,         NULL,
+    NPG_ROW_INT   ("holes",    AT(scan.holes), "0",      0,     1000,         NULL,
         "Balls of 6 % of the diagonal cut out of every frame"),
-    NPG_ROW_FLAG  ("vary",     AT(vary),     "no",
+    NPG_ROW_FLAG  ("vary",     AT(scan.vary), "no",
         "Let the point count vary between half and all of --points"),
     NPG_ROW_FLAG  ("normals",  AT(normals),  "yes",
         "Write normals"),
-    NPG_ROW_INT   ("cameras",  AT(cameras),  "0",      0,     64,           NULL,
+    NPG_ROW_INT   ("cameras",  AT(scan.cameras), "0",      0,     64,           NULL,
         "See the body through a ring of this many depth cameras; 0: its whole surface"),
-    NPG_ROW_INT   ("width",    AT(width),    "256",    16,    4096,         "PIXELS",
+    NPG_ROW_INT   ("width",    AT(scan.width), "256",    16,    4096,         "PIXELS",
         "Width and height of a camera's picture, pixels"),
-    NPG_ROW_INT   ("height",   AT(height),   "0",      0,     4096,         "PIXELS",
+    NPG_ROW_INT   ("height",   AT(scan.height), "0",      0,     4096,         "PIXELS",
         "Its height, pixels; 0: as its width"),
     NPG_ROW_FLAG  ("rig",      AT(rig),      "no",
         "Write what the cameras see as a rig, DIR/rig with rig.json, depth and colour images of a textured "
@@ -57,7 +57,7 @@ const npg_option npg_synth_options[] = {
         "Gaussian noise of a rig's depths, deviation in millimetres"),
     NPG_ROW_CHOICE("format",   AT(format),   "ply",    "ply|obj",
         "Of the files"),
-    NPG_ROW_INT   ("seed",     AT(seed),     "0",      0,     4294967295.0, NULL,
+    NPG_ROW_INT   ("seed",     AT(scan.seed), "0",      0,     4294967295.0, NULL,
         "Seed of all random numbers"),
     {0}};
 /* clang-format on */
@@ -95,15 +95,7 @@ static npg_status make_folders(const settings *s)
 
 static npg_scan capture_of(const settings *s, const npg_mesh *first)
 {
-    npg_scan capture = {.point_count = s->points,
-                        .vary = s->vary,
-                        .noise = s->noise,
-                        .outliers = s->outliers,
-                        .holes = s->holes,
-                        .cameras = s->cameras,
-                        .width = s->width,
-                        .height = s->height,
-                        .seed = (uint64_t)s->seed};
+    npg_scan capture = s->scan;
     npg_bounds bounds = npg_bounds_empty();
     npg_bounds_add_points(&bounds, first->vert_pos, first->vert_count);
     capture.diagonal = npg_bounds_diagonal(&bounds);
@@ -111,40 +103,16 @@ static npg_scan capture_of(const settings *s, const npg_mesh *first)
     return capture;
 }
 
-/* What moves, its surface, and a mesh to pose. */
-typedef struct moving {
-    const npg_figure *kind;
-    npg_body body;
-    npg_mesh *mesh;
-} moving;
-
-static void close_moving(moving *f)
-{
-    npg_mesh_unref(&f->mesh);
-    npg_mesh_unref(&f->body.rest);
-    npg_release(&f->body.weights);
-}
-
 /* The texture at the vertices of a body at rest. */
-static npg_status paint(npg_mesh *mesh)
+static npg_status paint(npg_mesh *mesh, const npg_mesh *rest)
 {
     NPG_TRY(npg_alloc_array(&mesh->vert_colours, NPG_FOR_MESH, mesh->vert_count, 4));
     for (size_t i = 0; i < mesh->vert_count; i++) {
-        const float *p = mesh->vert_pos + 3 * i;
+        const float *p = rest->vert_pos + 3 * i;
         npg_synth_colour(mesh->vert_colours + 4 * i,
                          (const double[3]){(double)p[0], (double)p[1], (double)p[2]});
     }
     return NPG_OK;
-}
-
-static npg_status open_moving(moving *f, const settings *s, bool is_changed)
-{
-    close_moving(f);
-    NPG_TRY(f->kind->open(&f->body, s->cell, is_changed));
-    NPG_TRY(npg_mesh_copy(&f->mesh, f->body.rest));
-    if (s->rig) NPG_TRY(paint(f->mesh));
-    if (f->mesh->vert_normals) return NPG_OK;
-    return npg_alloc_array(&f->mesh->vert_normals, NPG_FOR_MESH, f->mesh->vert_count, 3 * sizeof(float));
 }
 
 static npg_status write_points(const settings *s, const npg_scan *capture, const npg_mesh *mesh,
@@ -155,7 +123,7 @@ static npg_status write_points(const settings *s, const npg_scan *capture, const
                         points->count, NULL);
 }
 
-static npg_status write_images(const settings *s, const npg_scan *capture, const moving *f, int64_t t)
+static npg_status write_images(const settings *s, const npg_scan *capture, const npg_moving *f, int64_t t)
 {
     char folder[NPG_PATH_SIZE];
     NPG_TRY(npg_path_of(folder, s->output, "rig"));
@@ -165,17 +133,16 @@ static npg_status write_images(const settings *s, const npg_scan *capture, const
     return status;
 }
 
-static npg_status make_frames(const settings *s, moving *f, npg_scanned *points, size_t *total)
+static npg_status make_frames(const settings *s, npg_moving *f, npg_scanned *points, size_t *total)
 {
     npg_scan capture = {0};
     int64_t change = f->kind->changes ? f->kind->change : s->frames;
     for (int64_t t = 0; t < s->frames; t++) {
         npg_moment moment = {s->cycles * (double)t / (double)s->frames, s->travel, (double)(t - change)};
-        if (t == 0 || t == change) NPG_TRY(open_moving(f, s, t >= change));
+        if (t == 0 || t == change) NPG_TRY(npg_moving_open(f, s->cell, t >= change));
         npg_mesh *mesh = f->mesh;
-        f->kind->pose(&f->body, mesh->vert_pos, &moment);
-        npg_mesh_vertex_normals(mesh->vert_normals, mesh->vert_pos, mesh->vert_count, mesh->faces,
-                                mesh->face_count);
+        if (s->rig && !mesh->vert_colours) NPG_TRY(paint(mesh, f->body.rest));
+        npg_moving_pose(f, &moment);
         if (t == 0) capture = capture_of(s, mesh);
         NPG_TRY(s->rig ? write_images(s, &capture, f, t) : write_points(s, &capture, mesh, points, t));
         NPG_TRY(write_arrays(s->output, "truth", t, s, mesh->vert_pos, mesh->vert_normals, mesh->vert_count,
@@ -188,26 +155,24 @@ static npg_status make_frames(const settings *s, moving *f, npg_scanned *points,
 npg_status npg_synth(const npg_cli *cli, npg_figure *kind)
 {
     const settings *s = cli->values;
-    moving f = {kind, {0}, NULL};
+    npg_moving f = {.kind = kind};
     npg_scanned points = {0};
     size_t total = 0;
     if (!s->output[0]) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
-    if (s->rig && !s->cameras) return npg_error(NPG_USAGE, "a rig needs cameras: --cameras 4, say");
+    if (s->rig && !s->scan.cameras) return npg_error(NPG_USAGE, "a rig needs cameras: --cameras 4, say");
     if (kind->change < 0) kind->change = s->frames / 2;
     npg_status status = make_folders(s);
     if (!status) status = make_frames(s, &f, &points, &total);
     if (!status && s->rig)
-        printf("%lld frames of %lld cameras, truth of %zu vertices and %zu faces\n"
-               "rig     %s/rig/rig.json\ntruth   %s/truth\n",
-               (long long)s->frames, (long long)s->cameras, f.mesh->vert_count, f.mesh->face_count, s->output,
-               s->output);
+        printf("%lld frames of %lld cameras", (long long)s->frames, (long long)s->scan.cameras);
     if (!status && !s->rig)
-        printf("%lld frames, %.0f points each, truth of %zu vertices and %zu faces\n"
-               "points  %s/points\ntruth   %s/truth\n",
-               (long long)s->frames, (double)total / (double)s->frames, f.mesh->vert_count,
-               f.mesh->face_count, s->output, s->output);
+        printf("%lld frames, %.0f points each", (long long)s->frames, (double)total / (double)s->frames);
+    if (!status)
+        printf(", truth of %zu vertices and %zu faces\n%-7s %s/%s\ntruth   %s/truth\n", f.mesh->vert_count,
+               f.mesh->face_count, s->rig ? "rig" : "points", s->output, s->rig ? "rig/rig.json" : "points",
+               s->output);
     npg_scanned_close(&points);
-    close_moving(&f);
+    npg_moving_close(&f);
     return status;
 }
 

@@ -12,7 +12,6 @@
 
 #include "geometry/geometry.h"
 #include "tools/synth/synth.h"
-#include "tools/verbs.h"
 
 #define PI 3.14159265358979323846
 

@@ -146,6 +146,9 @@ int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped);
 /* An object of name, input, output and what verdict.json says. */
 json_t *npg_verdict_json(const npg_capture *capture);
 
+/* The same as a record of logs. */
+json_t *npg_verdict_record(const npg_capture *capture);
+
 /* Of a capture that is run with segments = auto an array of {folder, first_frame, last_frame, keyframe,
  * status, cause}, in time order; cause: what cut it off, null for none.  A new reference; NULL when it has
  * none yet. */

@@ -253,10 +253,7 @@ static npg_status conclude(npg_process *p, int how, const struct rusage *used)
     bool keeps = v->was_done && before.is_known;
     v->seconds = keeps ? before.seconds : npg_clock_s() - p->begun_s;
     v->peak_bytes = keeps ? before.peak_bytes : (size_t)used->ru_maxrss << 10;
-    log_record(capture,
-               json_pack("{s:s,s:s,s:i,s:o,s:f,s:I,s:b}", "event", "verdict", "verdict", v->word, "exit_code",
-                         v->exit_code, "message", npg_json_text(v->message), "seconds", v->seconds,
-                         "peak_memory_bytes", (json_int_t)v->peak_bytes, "was_done", (int)v->was_done));
+    log_record(capture, npg_verdict_record(capture));
     return npg_verdict_write(capture);
 }
 

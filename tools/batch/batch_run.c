@@ -48,10 +48,7 @@ static void report_end(work *w, const npg_capture *capture)
     else
         npg_reporter_log(w->reporter, level, npg_clock_s() - w->begun_s, capture->name, "%s after %.0f s%s%s",
                          v->word, v->seconds, *v->message ? ": " : "", v->message);
-    json_t *record = npg_verdict_json(capture);
-    json_object_set_new(record, "event", json_string("verdict"));
-    json_object_set_new(record, "was_done", json_boolean(v->was_done));
-    npg_reporter_print(w->reporter, record);
+    npg_reporter_print(w->reporter, npg_verdict_record(capture));
 }
 
 /* ---- progress ---- */

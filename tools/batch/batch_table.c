@@ -40,6 +40,7 @@ static npg_status add_frame(void *user, const json_t *line, const char *text, si
 static npg_status read_folder(figures *f, const npg_capture *capture, const char *folder)
 {
     char path[NPG_PATH_SIZE];
+    if (!folder || !npg_path_stays(folder)) return NPG_OK; /* not what a run has written */
     NPG_TRY(npg_path_of(path, capture->output, folder));
     return npg_is_in_folder(path, "frames.jsonl") ? npg_json_lines(path, "frames.jsonl", -1, add_frame, f)
                                                   : NPG_OK;

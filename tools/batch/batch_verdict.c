@@ -104,30 +104,22 @@ int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped)
 
 /* ---- segments ---- */
 
-/* NULL: not what a run has written. */
-static json_t *json_of_segment(const json_t *entry)
-{
-    const char *folder = NULL, *status = NULL;
-    const char *cause = json_string_value(npg_json_at(entry, "alarm.cause"));
-    json_int_t first = 0, last = 0, keyframe = 0;
-    if (json_unpack((json_t *)entry, "{ss sI sI sI ss}", "folder", &folder, "first_frame", &first,
-                    "last_frame", &last, "keyframe", &keyframe, "status", &status) ||
-        strchr(folder, '/') || !strcmp(folder, ".."))
-        return NULL;
-    return json_pack("{ss sI sI sI ss ss?}", "folder", folder, "first_frame", first, "last_frame", last,
-                     "keyframe", keyframe, "status", status, "cause", cause);
-}
-
 json_t *npg_capture_segments(const npg_capture *capture)
 {
+    static const char *const told[] = {"folder", "first_frame", "last_frame", "keyframe", "status"};
     if (capture->segments != NPG_BATCH_SEGMENTS_AUTO) return NULL;
     json_t *saved = npg_json_in(capture->output, "segments.json"), *list = json_object_get(saved, "segments");
-    json_t *segments = json_array_size(list) ? json_array() : NULL;
-    for (size_t i = 0; segments && i < json_array_size(list); i++)
-        if (json_array_append_new(segments, json_of_segment(json_array_get(list, i)))) {
-            json_decref(segments);
-            segments = NULL;
-        }
+    json_t *segments = json_array_size(list) && json_object_get(saved, "status") ? json_array() : NULL,
+           *entry;
+    size_t i;
+    json_array_foreach(segments ? list : NULL, i, entry)
+    {
+        json_t *cause = npg_json_at(entry, "alarm.cause"), *segment = json_object();
+        for (size_t k = 0; k < sizeof told / sizeof *told; k++)
+            json_object_set(segment, told[k], json_object_get(entry, told[k]));
+        json_object_set_new(segment, "cause", cause ? json_incref(cause) : json_null());
+        json_array_append_new(segments, segment);
+    }
     json_decref(saved);
     return segments;
 }
@@ -148,6 +140,14 @@ json_t *npg_verdict_json(const npg_capture *capture)
     json_t *segments = npg_verdict_is_done(v) ? npg_capture_segments(capture) : NULL;
     if (segments) json_object_set_new(object, "segments", segments);
     return object;
+}
+
+json_t *npg_verdict_record(const npg_capture *capture)
+{
+    json_t *record = json_pack("{s:s}", "event", "verdict");
+    json_object_update_new(record, npg_verdict_json(capture));
+    json_object_set_new(record, "was_done", json_boolean(capture->verdict.was_done));
+    return record;
 }
 
 npg_status npg_verdict_write(const npg_capture *capture)

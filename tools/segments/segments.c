@@ -17,48 +17,17 @@ static int64_t option_number(const npg_options *options, const char *name)
 
 /* ---- the frames of a segment, as --frames has them ---- */
 
-static npg_status count_all(int64_t *count, const npg_options *options)
+/* By their numbers, as in 0-6,8-13. */
+static npg_status frames_text(char **text, const npg_segments *s, int64_t first, int64_t last)
 {
-    npg_frame_files *all;
-    NPG_TRY(npg_capture_list(&all, options, ""));
-    *count = (int64_t)all->count;
-    npg_frame_files_close(&all);
-    return NPG_OK;
-}
-
-static npg_status slice_text(char **text, const npg_selection *slice, const npg_options *options,
-                             int64_t first, int64_t last)
-{
-    int64_t step = slice->is_slice ? slice->step : 1, begin = slice->has_first ? slice->first : 0, count;
-    if (begin < 0) {
-        NPG_TRY(count_all(&count, options));
-        begin = begin + count < 0 ? 0 : begin + count;
-    }
-    NPG_TRY(npg_alloc(text, NPG_FOR_RUN, 80));
-    snprintf(*text, 80, "%lld:%lld:%lld", (long long)(begin + first * step),
-             (long long)(begin + last * step + 1), (long long)step);
-    return NPG_OK;
-}
-
-static npg_status number_text(char **text, const npg_segments *s, int64_t first, int64_t last)
-{
-    size_t size = 24 * (size_t)(last - first + 1) + 1, used = 0;
+    size_t size = 48 * (size_t)(last - first + 1) + 1, used = 0;
     NPG_TRY(npg_alloc(text, NPG_FOR_RUN, size));
-    for (int64_t i = first; i <= last; i++)
-        used += (size_t)snprintf(*text + used, size - used, "%s%lld", used ? "," : "",
-                                 (long long)npg_segment_number(s, i));
+    for (int64_t i = first, end; i <= last; i = end + 1) {
+        for (end = i; end < last && npg_segment_number(s, end + 1) == npg_segment_number(s, end) + 1;) end++;
+        used += (size_t)snprintf(*text + used, size - used, "%s%lld-%lld", used ? "," : "",
+                                 (long long)npg_segment_number(s, i), (long long)npg_segment_number(s, end));
+    }
     return NPG_OK;
-}
-
-static npg_status frames_text(char **text, const npg_segments *s, const npg_options *options, int64_t first,
-                              int64_t last)
-{
-    npg_selection selection;
-    NPG_TRY(npg_selection_parse(&selection, s->selection));
-    npg_status status = selection.range_count ? number_text(text, s, first, last)
-                                              : slice_text(text, &selection, options, first, last);
-    npg_selection_clear(&selection);
-    return status;
 }
 
 /* ---- one segment ---- */
@@ -75,7 +44,7 @@ static npg_status set_segment_options(npg_options *options, const npg_segments *
 {
     char *frames, path[NPG_PATH_SIZE];
     if (!strcmp(segment->folder, ".")) return npg_options_set(options, "alarm", "split");
-    NPG_TRY(frames_text(&frames, s, options, segment->first - segment->shared_first,
+    NPG_TRY(frames_text(&frames, s, segment->first - segment->shared_first,
                         segment->last + segment->shared_last));
     npg_status status = npg_options_set(options, "frames", frames);
     npg_release(&frames);

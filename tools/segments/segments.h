@@ -8,8 +8,8 @@
  * frames.jsonl).
  *
  *     OUT/segment_<number>/       a job like any other; the number is that of its first own frame
- *     OUT/segments.json           the segments, why and where they were cut, their overlaps
- *     OUT/segments.partial.json   the same while the run is at work, from which it is resumed
+ *     OUT/segments.json           the segments, why and where they were cut; from which it is resumed; at the
+ *                                 end also their overlaps and "status"
  *     OUT/done.json               last of all
  *
  * A capture that one reference explains leaves what a run without --segments leaves, and segments.json. */
@@ -83,7 +83,7 @@ npg_status npg_segments_remove(const npg_segments *s);
 /* Remove a segment's results and its job. */
 npg_status npg_segment_remove(const npg_segments *s, const npg_segment *segment);
 
-/* OUT/segments.json in place of the partial one, and with several segments OUT/done.json. */
+/* The last OUT/segments.json, and with several segments OUT/done.json. */
 npg_status npg_segments_conclude(const npg_segments *s, bool is_partial);
 
 #endif

@@ -10,8 +10,7 @@
 #include "pipeline/json_file.h"
 #include "tools/segments/segments.h"
 
-#define WHOLE   "segments.json"
-#define PARTIAL "segments.partial.json"
+#define LIST "segments.json"
 
 void npg_segments_clear(npg_segments *s)
 {
@@ -63,7 +62,7 @@ static npg_status add_saved(npg_segments *s, const json_t *entry)
                            .keyframe = number_in(entry, "keyframe_wanted")};
     if (!folder || strchr(folder, '/') || strlen(folder) >= sizeof segment.folder || folder[0] == 0 ||
         !strcmp(folder, ".."))
-        return npg_error(NPG_USAGE, "%s/%s is damaged; --restart discards what is there", s->output, WHOLE);
+        return npg_error(NPG_USAGE, "%s/%s is damaged; --restart discards what is there", s->output, LIST);
     strcpy(segment.folder, folder);
     if (json_is_object(json_object_get(entry, "alarm")))
         segment.alarm = json_deep_copy(json_object_get(entry, "alarm"));
@@ -77,10 +76,10 @@ static bool is_of_these(const npg_segments *s, const json_t *saved)
                           number_in(saved, "frames") == (int64_t)s->frames->count);
 }
 
-static npg_status load(npg_segments *s, const char *name)
+npg_status npg_segments_load(npg_segments *s)
 {
     json_t *saved;
-    npg_status status = npg_json_load(&saved, s->output, name, NPG_USAGE);
+    npg_status status = npg_json_load(&saved, s->output, LIST, NPG_USAGE);
     if (status == NPG_USAGE) npg_error(status, "%s; --restart discards what is there", npg_error_text());
     const json_t *list = json_object_get(saved, "segments");
     for (size_t i = 0; i < json_array_size(list) && !status; i++)
@@ -94,20 +93,22 @@ static npg_status load(npg_segments *s, const char *name)
     return status;
 }
 
-npg_status npg_segments_load(npg_segments *s)
+/* Whether a folder was done with this word of option alarm. */
+static bool is_done_with(const char *folder, const char *word)
 {
-    NPG_TRY(load(s, PARTIAL));
-    return s->count ? NPG_OK : load(s, WHOLE);
+    json_t *done = npg_json_in(folder, "done.json");
+    const char *alarm = json_string_value(npg_json_at(done, "options.alarm"));
+    bool is = alarm && !strcmp(alarm, word);
+    json_decref(done);
+    return is;
 }
 
 bool npg_segments_was_alarmed(const npg_segments *s)
 {
-    json_t *done = npg_json_in(s->output, "done.json"), *report = npg_json_in(s->output, "report.json");
-    const char *mode = json_string_value(npg_json_at(done, "options.alarm"));
-    bool was = mode && !strcmp(mode, "report") &&
-               (json_is_object(npg_json_at(report, "stages.evaluate.topology.forward")) ||
-                json_is_object(npg_json_at(report, "stages.evaluate.topology.backward")));
-    json_decref(done);
+    json_t *report = npg_json_in(s->output, "report.json");
+    const json_t *topology = npg_json_at(report, "stages.evaluate.topology");
+    bool was = is_done_with(s->output, "report") && (json_is_object(json_object_get(topology, "forward")) ||
+                                                     json_is_object(json_object_get(topology, "backward")));
     json_decref(report);
     return was;
 }
@@ -122,16 +123,6 @@ static npg_status remove_in(const char *folder, const char *name)
 }
 
 /* ---- other verbs ---- */
-
-/* One of several: it was done for a list that lies elsewhere. */
-static bool is_part(const char *folder)
-{
-    json_t *done = npg_json_in(folder, "done.json");
-    const char *mode = json_string_value(npg_json_at(done, "options.alarm"));
-    bool is = mode && !strcmp(mode, "split");
-    json_decref(done);
-    return is;
-}
 
 /* "OUT/segment_0000 (frames 0 to 6), ...", as many as there is room for. */
 static void describe_segments(char *text, size_t size, const json_t *list, const char *output)
@@ -148,8 +139,8 @@ static void describe_segments(char *text, size_t size, const json_t *list, const
 
 npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alone)
 {
-    json_t *saved = npg_json_in(folder, WHOLE), *open = npg_json_in(folder, PARTIAL);
-    const json_t *list = json_object_get(open ? open : saved, "segments");
+    json_t *saved = npg_json_in(folder, LIST);
+    const json_t *list = json_object_get(saved, "segments");
     npg_status status = NPG_OK;
     char text[512];
     if (json_array_size(list) > 1 && !is_alone) {
@@ -165,24 +156,24 @@ npg_status npg_segments_refuse(const char *folder, const char *verb, bool is_alo
                            "(neupig run INPUT -o NEW --segments auto --frames FIRST:), "
                            "or all of them again (--restart)",
                            folder, json_array_size(list), verb);
-    } else if (is_alone && !list && is_part(folder)) {
+    } else if (is_alone && !list &&
+               is_done_with(folder, "split")) { /* one of several, whose list lies elsewhere */
         status = npg_error(NPG_USAGE,
                            "%s is one segment of a capture; neupig %s would separate it from the others: "
                            "run the frames that came later into a folder of their own",
                            folder, verb);
     }
     json_decref(saved);
-    json_decref(open);
     return status;
 }
 
 npg_status npg_segments_drop_outdated(const char *output)
 {
-    json_t *saved = npg_json_in(output, WHOLE), *done = npg_json_in(output, "done.json");
+    json_t *saved = npg_json_in(output, LIST), *done = npg_json_in(output, "done.json");
     bool is_old = saved && number_in(saved, "frames") != number_in(done, "frames");
     json_decref(saved);
     json_decref(done);
-    return is_old ? remove_in(output, WHOLE) : NPG_OK;
+    return is_old ? remove_in(output, LIST) : NPG_OK;
 }
 
 /* ---- writing ---- */
@@ -208,7 +199,7 @@ static json_t *json_of_all(const npg_segments *s)
 npg_status npg_segments_save(const npg_segments *s)
 {
     json_t *saved = json_of_all(s);
-    npg_status status = npg_json_write(s->output, PARTIAL, saved);
+    npg_status status = npg_json_write(s->output, LIST, saved);
     json_decref(saved);
     return status;
 }
@@ -232,8 +223,7 @@ npg_status npg_segments_remove(const npg_segments *s)
     NPG_TRY(remove_in(s->output, "done.json"));
     for (size_t i = 0; i < s->count; i++)
         if (strcmp(s->list[i].folder, ".") != 0) NPG_TRY(remove_in(s->output, s->list[i].folder));
-    NPG_TRY(remove_in(s->output, WHOLE));
-    return remove_in(s->output, PARTIAL);
+    return remove_in(s->output, LIST);
 }
 
 /* ---- the end ---- */
@@ -266,7 +256,7 @@ static npg_status write_done(const npg_segments *s, bool is_partial)
     json_t *files = json_array();
     npg_status status = NPG_OK;
     for (size_t i = 0; i <= s->count && !status; i++) {
-        char name[64] = WHOLE;
+        char name[64] = LIST;
         if (i) snprintf(name, sizeof name, "%s/done.json", s->list[i - 1].folder);
         json_t *entry = json_pack("{ss}", "path", name);
         status = npg_file_facts(entry, s->output, name);
@@ -305,8 +295,7 @@ npg_status npg_segments_conclude(const npg_segments *s, bool is_partial)
         status = add_report(json_array_get(list, i), s, &s->list[i]);
     json_object_set_new(saved, "overlaps", json_of_overlaps(s));
     json_object_set_new(saved, "status", json_string(is_partial ? "partial" : "ok"));
-    if (!status) status = write_if_new(s, WHOLE, saved);
+    if (!status) status = write_if_new(s, LIST, saved);
     json_decref(saved);
-    if (!status && s->count > 1) status = write_done(s, is_partial);
-    return status ? status : remove_in(s->output, PARTIAL);
+    return !status && s->count > 1 ? write_done(s, is_partial) : status;
 }

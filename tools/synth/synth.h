@@ -2,6 +2,7 @@
 #ifndef NPG_SYNTH_H
 #define NPG_SYNTH_H
 
+#include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/mesh.h"
 #include "tools/cli.h"
@@ -35,6 +36,18 @@ typedef struct npg_figure {
 } npg_figure;
 
 extern const npg_figure npg_walker;
+
+/* A figure, its surface, and the mesh that is posed, with normals; begins zeroed but for the kind. */
+typedef struct npg_moving {
+    const npg_figure *kind;
+    npg_body body;
+    npg_mesh *mesh; /* owned */
+} npg_moving;
+
+/* In place of what was open. */
+npg_status npg_moving_open(npg_moving *moving, double cell, bool is_changed);
+void npg_moving_pose(npg_moving *moving, const npg_moment *moment);
+void npg_moving_close(npg_moving *moving);
 
 /* The verb, of any figure; figure->change is then the frame. */
 npg_status npg_synth(const npg_cli *cli, npg_figure *figure);
@@ -98,7 +111,7 @@ npg_status npg_scan_frame(npg_scanned *points, const npg_scan *capture, const np
 
 #define NPG_FOR_CAMERAS 10 /* key of the cameras' random stream */
 
-/* ---- depth cameras: where they stand, and what a mesh looks like from there ---- */
+/* ---- depth cameras: where they stand, and what they see ---- */
 
 /* Pixel (x, y) has its centre at x + 0.5, y + 0.5; y goes up. */
 typedef struct npg_synth_camera {
@@ -107,25 +120,14 @@ typedef struct npg_synth_camera {
     int64_t width, height;
 } npg_synth_camera;
 
-typedef struct npg_synth_picture {
-    double *depth;  /* H x W, along `ahead`; infinity where nothing is seen */
-    uint32_t *face; /* H x W: the face seen                                 */
-} npg_synth_picture;
-
 /* The i-th of a ring of capture->cameras. */
 npg_synth_camera npg_synth_camera_of_ring(const npg_scan *capture, int64_t i);
 
-npg_synth_picture npg_synth_picture_take(npg_arena *arena, const npg_synth_camera *camera);
+/* What each pixel (y * width + x) sees of a surface; t is the depth along `ahead`.  hits: H x W. */
+npg_status npg_synth_look(npg_ray_hit *hits, const npg_surface *surface, const npg_synth_camera *camera);
 
-/* Draw the mesh from scratch. */
-void npg_synth_draw(npg_synth_picture *picture, const npg_synth_camera *camera, const npg_mesh *mesh);
-
-/* The point at a depth behind pixel `at` (y * width + x). */
+/* The point at a depth behind a pixel. */
 void npg_synth_unproject(double pos[3], const npg_synth_camera *camera, int64_t at, double depth);
-
-/* Whether a face, seen at pos, turns its front to the camera; its unit normal. */
-bool npg_synth_is_front(double normal[3], const npg_synth_camera *camera, const npg_mesh *mesh, uint32_t face,
-                        const double pos[3]);
 
 /* ---- rigs: depth and colour images of a textured body, with rig.json (samples/guide/rigs.md) ---- */
 

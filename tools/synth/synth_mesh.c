@@ -2,7 +2,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/geometry.h"
 #include "tools/synth/synth.h"
 
 /* Each cube is cut into six tetrahedra around its diagonal, so that neighbours
@@ -50,19 +49,18 @@ static npg_status open_field(field *f, npg_distance_fn *distance, const void *us
     return NPG_OK;
 }
 
-/* The vertex where the edge between two nodes crosses the surface, made when first asked for. */
-static npg_status cut_edge(field *f, size_t a, size_t b, uint32_t *vertex)
+/* The node at a corner of the cube that begins at a node. */
+static size_t node_at(const field *f, size_t cube, int corner)
 {
-    if (a > b) {
-        size_t swap = a;
-        a = b;
-        b = swap;
-    }
-    size_t step = b - a, row = f->size[0], layer = f->size[0] * f->size[1];
-    int direction = (int)(step >= layer) << 2;
-    step -= step >= layer ? layer : 0;
-    direction |= (int)(step >= row) << 1 | (int)((step >= row ? step - row : step) > 0);
-    uint32_t *slot = &f->cut[a][direction - 1];
+    return cube + (size_t)(corner & 1) +
+           f->size[0] * ((size_t)(corner >> 1 & 1) + f->size[1] * (size_t)(corner >> 2));
+}
+
+/* The vertex where the edge between two corners crosses the surface, made when first asked for. */
+static npg_status cut_edge(field *f, size_t cube, int from, int to, uint32_t *vertex)
+{
+    size_t a = node_at(f, cube, from < to ? from : to), b = node_at(f, cube, from < to ? to : from);
+    uint32_t *slot = &f->cut[a][(from ^ to) - 1]; /* the corners of an edge lie one behind the other */
     if (!*slot) {
         double pa[3], pb[3], t = f->value[a] / (f->value[a] - f->value[b]);
         NPG_TRY(npg_arena_grow(&f->arena, &f->vert_pos, &f->vert_room, f->vert_count + 1, 3 * sizeof(float)));
@@ -84,12 +82,12 @@ static npg_status add_face(field *f, uint32_t a, uint32_t b, uint32_t c)
 }
 
 /* The corners come in an order of positive orientation. */
-static npg_status march_tetrahedron(field *f, const size_t corner[4])
+static npg_status march_tetrahedron(field *f, size_t cube, const int corner[4])
 {
     int inside[4], outside[4], in = 0, out = 0;
     uint32_t v[4];
     for (int c = 0; c < 4; c++) {
-        if (f->value[corner[c]] < 0)
+        if (f->value[node_at(f, cube, corner[c])] < 0)
             inside[in++] = c;
         else
             outside[out++] = c;
@@ -97,7 +95,7 @@ static npg_status march_tetrahedron(field *f, const size_t corner[4])
     if (!in || !out) return NPG_OK;
     if (in == 2) {
         for (int e = 0; e < 4; e++)
-            NPG_TRY(cut_edge(f, corner[inside[e == 1 || e == 2]], corner[outside[e >= 2]], &v[e]));
+            NPG_TRY(cut_edge(f, cube, corner[inside[e == 1 || e == 2]], corner[outside[e >= 2]], &v[e]));
         /* v: (i0,o0) (i1,o0) (i1,o1) (i0,o1), a quad; its sense follows the parity
          * of the order of corners. */
         bool odd = (inside[0] + inside[1]) % 2 == 0;
@@ -105,31 +103,18 @@ static npg_status march_tetrahedron(field *f, const size_t corner[4])
         return odd ? add_face(f, v[0], v[2], v[3]) : add_face(f, v[0], v[3], v[2]);
     }
     int apex = in == 1 ? inside[0] : outside[0], *base = in == 1 ? outside : inside;
-    for (int e = 0; e < 3; e++) NPG_TRY(cut_edge(f, corner[apex], corner[base[e]], &v[e]));
+    for (int e = 0; e < 3; e++) NPG_TRY(cut_edge(f, cube, corner[apex], corner[base[e]], &v[e]));
     bool odd = (apex % 2 == 1) == (in == 1);
     return odd ? add_face(f, v[0], v[2], v[1]) : add_face(f, v[0], v[1], v[2]);
 }
 
 static npg_status march(field *f)
 {
-    size_t row = f->size[0], layer = f->size[0] * f->size[1];
     for (size_t z = 0; z + 1 < f->size[2]; z++)
         for (size_t y = 0; y + 1 < f->size[1]; y++)
-            for (size_t x = 0; x + 1 < f->size[0]; x++) {
-                size_t node = x + y * row + z * layer, corner[8], four[4];
-                bool any_in = false, any_out = false;
-                for (int c = 0; c < 8; c++) {
-                    corner[c] =
-                        node + (size_t)(c & 1) + (size_t)(c >> 1 & 1) * row + (size_t)(c >> 2) * layer;
-                    any_in |= f->value[corner[c]] < 0;
-                    any_out |= f->value[corner[c]] >= 0;
-                }
-                if (!any_in || !any_out) continue;
-                for (int t = 0; t < 6; t++) {
-                    for (int c = 0; c < 4; c++) four[c] = corner[tetrahedra[t][c]];
-                    NPG_TRY(march_tetrahedron(f, four));
-                }
-            }
+            for (size_t x = 0; x + 1 < f->size[0]; x++)
+                for (int t = 0; t < 6; t++)
+                    NPG_TRY(march_tetrahedron(f, x + f->size[0] * (y + f->size[1] * z), tetrahedra[t]));
     return NPG_OK;
 }
 
@@ -186,14 +171,9 @@ static npg_status even_out(npg_mesh *mesh, npg_distance_fn *distance, const void
 static npg_status check_closed(const npg_mesh *mesh)
 {
     npg_manifold facts;
-    uint32_t *component_of;
     size_t components;
     NPG_TRY(npg_mesh_manifold(&facts, mesh));
-    NPG_TRY(npg_alloc_array(&component_of, NPG_FOR_MESH, mesh->vert_count, sizeof *component_of));
-    npg_status status =
-        npg_mesh_components(component_of, &components, mesh->vert_count, mesh->faces, mesh->face_count);
-    npg_release(&component_of);
-    if (status) return status;
+    NPG_TRY(npg_mesh_count_components(&components, mesh));
     if (facts.border_edges || facts.crowded_edges || facts.misoriented_edges || facts.degenerate_faces ||
         components != 1 || npg_mesh_volume(mesh) <= 0)
         return npg_error(NPG_FAILED,

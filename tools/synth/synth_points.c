@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/geometry.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/random.h"
 
@@ -105,22 +104,19 @@ static npg_status sample_surface(npg_scanned *points, const npg_scan *capture, c
     return npg_mesh_sample(points->pos, points->normals, mesh, count, capture->seed, frame, FOR_SAMPLES);
 }
 
-/* ---- a ring of depth cameras around the body, each with its own depth buffer ---- */
+/* ---- a ring of depth cameras around the body ---- */
 
 #define PI 3.14159265358979323846
 
-typedef npg_synth_camera camera;
-typedef npg_synth_picture picture;
-
-/* The i-th of a ring at half the diagonal's height above the middle, turned to the middle. */
-camera npg_synth_camera_of_ring(const npg_scan *capture, int64_t i)
+/* At half the diagonal's height above the middle, turned to the middle. */
+npg_synth_camera npg_synth_camera_of_ring(const npg_scan *capture, int64_t i)
 {
     /* Far enough that the whole body is in the picture; at two heights, so that tops of limbs are seen. */
     const double distance = 1.3 * capture->diagonal, lift = i % 2 ? 0.10 : 0.35;
     double angle = 2 * PI * (double)i / (double)capture->cameras;
     int64_t height = capture->height ? capture->height : capture->width;
     int64_t side = height < capture->width ? height : capture->width;
-    camera c = {.width = capture->width, .height = height, .focal = 0.95 * (double)side};
+    npg_synth_camera c = {.width = capture->width, .height = height, .focal = 0.95 * (double)side};
     double ahead[3] = {-sin(angle), -lift, -cos(angle)}, length = npg_vec3_length(ahead);
     for (int k = 0; k < 3; k++) {
         c.ahead[k] = ahead[k] / length;
@@ -132,87 +128,50 @@ camera npg_synth_camera_of_ring(const npg_scan *capture, int64_t i)
     return c;
 }
 
-/* Pixel coordinates (x, y) and depth (z) of a point. */
-static void project(double out[3], const camera *c, const float *p)
-{
-    double from_eye[3] = {(double)p[0] - c->eye[0], (double)p[1] - c->eye[1], (double)p[2] - c->eye[2]};
-    out[2] = npg_vec3_dot(from_eye, c->ahead);
-    out[0] = 0.5 * (double)c->width + c->focal * npg_vec3_dot(from_eye, c->right) / out[2];
-    out[1] = 0.5 * (double)c->height + c->focal * npg_vec3_dot(from_eye, c->up) / out[2];
-}
-
-static double cross_2d(const double a[3], const double b[3], double x, double y)
-{
-    return (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
-}
-
-/* Draw one face into the depth buffer; pixel centres, 1 / depth is linear on the picture. */
-static void draw_face(picture *out, const camera *c, const npg_mesh *mesh, uint32_t f)
-{
-    double v[3][3], lo[2], hi[2];
-    for (int k = 0; k < 3; k++) {
-        project(v[k], c, mesh->vert_pos + 3 * (size_t)mesh->faces[3 * (size_t)f + (size_t)k]);
-        if (v[k][2] <= 0) return;
-    }
-    double area = cross_2d(v[0], v[1], v[2][0], v[2][1]);
-    if (area == 0) return;
-    for (int k = 0; k < 2; k++) {
-        lo[k] = fmax(ceil(fmin(fmin(v[0][k], v[1][k]), v[2][k]) - 0.5), 0);
-        hi[k] = fmin(floor(fmax(fmax(v[0][k], v[1][k]), v[2][k]) - 0.5),
-                     (double)((k ? c->height : c->width) - 1));
-    }
-    for (int64_t y = (int64_t)lo[1]; y <= (int64_t)hi[1]; y++)
-        for (int64_t x = (int64_t)lo[0]; x <= (int64_t)hi[0]; x++) {
-            double px = (double)x + 0.5, py = (double)y + 0.5;
-            double a = cross_2d(v[1], v[2], px, py) / area, b = cross_2d(v[2], v[0], px, py) / area;
-            if (a < 0 || b < 0 || a + b > 1) continue;
-            double depth = 1 / (a / v[0][2] + b / v[1][2] + (1 - a - b) / v[2][2]);
-            size_t at = (size_t)(y * c->width + x);
-            if (depth >= out->depth[at]) continue;
-            out->depth[at] = depth;
-            out->face[at] = f;
-        }
-}
-
-picture npg_synth_picture_take(npg_arena *arena, const camera *c)
-{
-    size_t pixels = (size_t)(c->width * c->height);
-    return (picture){npg_arena_take(arena, pixels, sizeof(double)),
-                     npg_arena_take(arena, pixels, sizeof(uint32_t))};
-}
-
-void npg_synth_draw(picture *out, const camera *c, const npg_mesh *mesh)
-{
-    for (int64_t p = 0; p < c->width * c->height; p++) out->depth[p] = INFINITY;
-    for (size_t f = 0; f < mesh->face_count; f++) draw_face(out, c, mesh, (uint32_t)f);
-}
-
-void npg_synth_unproject(double pos[3], const camera *c, int64_t at, double depth)
+/* What one pixel further along `ahead` is. */
+static void look_through(double out[3], const npg_synth_camera *c, int64_t at)
 {
     double x = ((double)(at % c->width) + 0.5 - 0.5 * (double)c->width) / c->focal;
     double y = ((double)(at / c->width) + 0.5 - 0.5 * (double)c->height) / c->focal;
-    for (int k = 0; k < 3; k++) pos[k] = c->eye[k] + depth * (c->ahead[k] + x * c->right[k] + y * c->up[k]);
+    for (int k = 0; k < 3; k++) out[k] = c->ahead[k] + x * c->right[k] + y * c->up[k];
 }
 
-bool npg_synth_is_front(double normal[3], const camera *c, const npg_mesh *mesh, uint32_t face,
-                        const double pos[3])
+void npg_synth_unproject(double pos[3], const npg_synth_camera *c, int64_t at, double depth)
 {
-    double facing = 0;
-    npg_face_normal(normal, mesh->vert_pos, mesh->faces + 3 * (size_t)face);
-    for (int k = 0; k < 3; k++) facing += normal[k] * (c->eye[k] - pos[k]);
-    return facing > 0;
+    look_through(pos, c, at);
+    for (int k = 0; k < 3; k++) pos[k] = c->eye[k] + depth * pos[k];
+}
+
+npg_status npg_synth_look(npg_ray_hit *hits, const npg_surface *surface, const npg_synth_camera *c)
+{
+    npg_ray *rays;
+    size_t pixels = (size_t)(c->width * c->height);
+    NPG_TRY(npg_alloc_array(&rays, NPG_FOR_FRAMES, pixels, sizeof *rays));
+    for (size_t at = 0; at < pixels; at++) {
+        double direction[3];
+        look_through(direction, c, (int64_t)at);
+        rays[at].t_max = INFINITY;
+        for (int k = 0; k < 3; k++) {
+            rays[at].origin[k] = (float)c->eye[k];
+            rays[at].direction[k] = (float)direction[k];
+        }
+    }
+    npg_status status = npg_surface_rays(surface, hits, rays, pixels, 0);
+    npg_release(&rays);
+    return status;
 }
 
 /* The surface point behind every pixel that sees a front side, with noise along its ray. */
-static npg_status add_seen_points(npg_scanned *points, const picture *seen, const camera *c,
+static npg_status add_seen_points(npg_scanned *points, const npg_ray_hit *hits, const npg_synth_camera *c,
                                   const npg_mesh *mesh, double noise, npg_random *random)
 {
     for (int64_t at = 0; at < c->width * c->height; at++) {
-        double depth = seen->depth[at], pos[3], normal[3];
-        if (isinf(depth)) continue;
-        if (noise > 0) depth += noise * npg_random_gauss(random);
-        npg_synth_unproject(pos, c, at, depth);
-        if (npg_synth_is_front(normal, c, mesh, seen->face[at], pos)) NPG_TRY(add_point(points, pos, normal));
+        double pos[3], normal[3];
+        if (hits[at].face == UINT32_MAX || hits[at].is_back) continue;
+        npg_synth_unproject(pos, c, at,
+                            (double)hits[at].t + (noise > 0 ? noise * npg_random_gauss(random) : 0));
+        npg_face_normal(normal, mesh->vert_pos, mesh->faces + 3 * (size_t)hits[at].face);
+        NPG_TRY(add_point(points, pos, normal));
     }
     return NPG_OK;
 }
@@ -221,17 +180,22 @@ static npg_status add_seen_points(npg_scanned *points, const picture *seen, cons
 static npg_status see_points(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh,
                              uint64_t frame)
 {
-    npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    npg_surface *surface = NULL;
+    npg_ray_hit *hits = NULL;
     npg_random random = npg_random_stream(capture->seed, frame, NPG_FOR_CAMERAS);
-    camera first = npg_synth_camera_of_ring(capture, 0);
-    picture seen = npg_synth_picture_take(&scratch, &first);
-    npg_status status = npg_arena_status(&scratch);
+    npg_status status =
+        npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
     for (int64_t i = 0; i < capture->cameras && !status; i++) {
-        camera c = npg_synth_camera_of_ring(capture, i);
-        npg_synth_draw(&seen, &c, mesh);
-        status = add_seen_points(points, &seen, &c, mesh, 0.01 * capture->noise * capture->diagonal, &random);
+        npg_synth_camera c = npg_synth_camera_of_ring(capture, i);
+        if (!hits)
+            status = npg_alloc_array(&hits, NPG_FOR_FRAMES, (size_t)(c.width * c.height), sizeof *hits);
+        if (!status) status = npg_synth_look(hits, surface, &c);
+        if (!status)
+            status =
+                add_seen_points(points, hits, &c, mesh, 0.01 * capture->noise * capture->diagonal, &random);
     }
-    npg_arena_release(&scratch);
+    npg_surface_close(&surface);
+    npg_release(&hits);
     return status;
 }
 

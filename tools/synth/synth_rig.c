@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "geometry/geometry.h"
 #include "pipeline/file.h"
 #include "pipeline/json_file.h"
 #include "pipeline/random.h"
@@ -95,50 +94,28 @@ static npg_status write_png(const char *folder, int64_t camera, const char *kind
     return npg_error(NPG_DISK, "%s: %s", path, image.message);
 }
 
-/* The place of a face's point at rest, by its barycentric weights. */
-static void place_at_rest(double out[3], const npg_mesh *mesh, const npg_mesh *rest, uint32_t face,
-                          const double pos[3])
-{
-    const uint32_t *corner = mesh->faces + 3 * (size_t)face;
-    double weights[3], all = 0, normal[3];
-    npg_face_cross(normal, mesh->vert_pos, corner);
-    for (int k = 0; k < 3; k++) {
-        double a[3], b[3], cross[3];
-        for (size_t i = 0; i < 3; i++) {
-            a[i] = (double)mesh->vert_pos[3 * (size_t)corner[(k + 1) % 3] + i] - pos[i];
-            b[i] = (double)mesh->vert_pos[3 * (size_t)corner[(k + 2) % 3] + i] - pos[i];
-        }
-        npg_vec3_cross(cross, a, b);
-        weights[k] = npg_vec3_dot(cross, normal);
-        all += weights[k];
-    }
-    for (size_t i = 0; i < 3; i++) {
-        out[i] = 0;
-        for (int k = 0; k < 3; k++)
-            out[i] += weights[k] / all * (double)rest->vert_pos[3 * (size_t)corner[k] + i];
-    }
-}
-
 typedef struct images {
-    npg_synth_picture seen;
+    npg_ray_hit *seen;
     uint16_t *depth; /* H x W, first row on top */
     uint8_t *colour; /* H x W x 3               */
 } images;
 
-static void fill_images(images *im, const npg_synth_camera *c, const npg_mesh *mesh, const npg_mesh *rest,
-                        double noise_m, npg_random *random)
+static void fill_images(images *im, const npg_synth_camera *c, const npg_mesh *rest, double noise_m,
+                        npg_random *random)
 {
     size_t pixels = (size_t)(c->width * c->height);
     memset(im->depth, 0, pixels * sizeof *im->depth);
     memset(im->colour, 0, 3 * pixels);
     for (int64_t at = 0; at < c->width * c->height; at++) {
-        double depth = im->seen.depth[at], pos[3], normal[3], at_rest[3];
+        const npg_ray_hit *hit = &im->seen[at];
+        double at_rest[3] = {0}, depth = (double)hit->t;
         size_t to = (size_t)((c->height - 1 - at / c->width) * c->width + at % c->width);
         uint8_t rgba[4];
-        if (isinf(depth)) continue;
-        npg_synth_unproject(pos, c, at, depth);
-        if (!npg_synth_is_front(normal, c, mesh, im->seen.face[at], pos)) continue;
-        place_at_rest(at_rest, mesh, rest, im->seen.face[at], pos);
+        if (hit->face == UINT32_MAX || hit->is_back) continue;
+        for (size_t k = 0; k < 3; k++)
+            for (size_t i = 0; i < 3; i++)
+                at_rest[i] += (double)hit->weights[k] *
+                              (double)rest->vert_pos[3 * (size_t)rest->faces[3 * (size_t)hit->face + k] + i];
         npg_synth_colour(rgba, at_rest);
         memcpy(im->colour + 3 * to, rgba, 3);
         if (noise_m > 0) depth += noise_m * npg_random_gauss(random);
@@ -150,21 +127,25 @@ npg_status npg_synth_rig_frame(const char *folder, const npg_scan *capture, cons
                                const npg_mesh *rest, int64_t frame, double noise_m)
 {
     images im;
+    npg_surface *surface = NULL;
     npg_random random = npg_random_stream(capture->seed, (uint64_t)frame, NPG_FOR_CAMERAS);
     npg_synth_camera first = upright(capture, 0);
     size_t pixels = (size_t)(first.width * first.height);
     npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
-    im.seen = npg_synth_picture_take(&scratch, &first);
+    im.seen = npg_arena_take(&scratch, pixels, sizeof *im.seen);
     im.depth = npg_arena_take(&scratch, pixels, sizeof *im.depth);
     im.colour = npg_arena_take(&scratch, pixels, 3);
     npg_status status = npg_arena_status(&scratch);
+    if (!status)
+        status = npg_surface_open(&surface, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
     for (int64_t i = 0; i < capture->cameras && !status; i++) {
         npg_synth_camera c = upright(capture, i);
-        npg_synth_draw(&im.seen, &c, mesh);
-        fill_images(&im, &c, mesh, rest, noise_m, &random);
-        status = write_png(folder, i, "depth", frame, &c, PNG_FORMAT_LINEAR_Y, im.depth);
+        status = npg_synth_look(im.seen, surface, &c);
+        if (!status) fill_images(&im, &c, rest, noise_m, &random);
+        if (!status) status = write_png(folder, i, "depth", frame, &c, PNG_FORMAT_LINEAR_Y, im.depth);
         if (!status) status = write_png(folder, i, "colour", frame, &c, PNG_FORMAT_RGB, im.colour);
     }
+    npg_surface_close(&surface);
     npg_arena_release(&scratch);
     return status;
 }

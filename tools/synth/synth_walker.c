@@ -2,7 +2,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/geometry.h"
 #include "tools/synth/synth.h"
 
 #define PI 3.14159265358979323846
@@ -142,20 +141,14 @@ void npg_walker_bones(npg_bone_pose out[NPG_BONES], npg_gait_fn *gait, const npg
             turn_about(turn, axis, angles[axis]);
             multiply(local, turn, local);
         }
-        const npg_bone_pose *parent = it->parent < 0 ? NULL : &out[it->parent];
-        for (int k = 0; k < 3; k++) {
-            moved_joint[k] = it->joint[k];
-            if (!parent) continue;
-            const double *row = parent->rotation + 3 * k;
-            moved_joint[k] =
-                row[0] * it->joint[0] + row[1] * it->joint[1] + row[2] * it->joint[2] + parent->shift[k];
-        }
-        if (parent)
-            multiply(out[b].rotation, parent->rotation, local);
-        else {
+        if (it->parent >= 0) {
+            move(moved_joint, &out[it->parent], it->joint);
+            multiply(out[b].rotation, out[it->parent].rotation, local);
+        } else {
             memcpy(out[b].rotation, local, sizeof local);
-            moved_joint[1] += 0.02 * cos(4 * PI * moment->phase);
-            moved_joint[2] += moment->travel * moment->phase;
+            moved_joint[0] = it->joint[0];
+            moved_joint[1] = it->joint[1] + 0.02 * cos(4 * PI * moment->phase);
+            moved_joint[2] = it->joint[2] + moment->travel * moment->phase;
         }
         for (int k = 0; k < 3; k++) {
             const double *row = out[b].rotation + 3 * k;
@@ -218,15 +211,13 @@ void npg_walker_bend(const npg_body *body, float *vert_pos, const npg_bone_pose 
 {
     for (size_t v = 0; v < body->rest->vert_count; v++) {
         const float *p = body->rest->vert_pos + 3 * v, *weights = body->weights + v * NPG_BONES;
+        const double at[3] = {(double)p[0], (double)p[1], (double)p[2]};
         double moved[3] = {0}, sum = 0;
         for (int b = 0; b < NPG_BONES; b++) {
-            double weight = (double)weights[b];
+            double weight = (double)weights[b], with_bone[3];
             sum += weight;
-            for (int k = 0; k < 3 && weight > 0; k++) {
-                const double *row = bones[b].rotation + 3 * k;
-                moved[k] += weight * (row[0] * (double)p[0] + row[1] * (double)p[1] + row[2] * (double)p[2] +
-                                      bones[b].shift[k]);
-            }
+            move(with_bone, &bones[b], at);
+            for (int k = 0; k < 3; k++) moved[k] += weight * with_bone[k];
         }
         for (int k = 0; k < 3; k++) vert_pos[3 * v + k] = (float)(moved[k] / sum);
     }
@@ -246,3 +237,28 @@ static void pose_walker(const npg_body *body, float *vert_pos, const npg_moment 
 }
 
 const npg_figure npg_walker = {.open = open_walker, .pose = pose_walker};
+
+/* ---- figures ---- */
+
+npg_status npg_moving_open(npg_moving *f, double cell, bool is_changed)
+{
+    npg_moving_close(f);
+    NPG_TRY(f->kind->open(&f->body, cell, is_changed));
+    NPG_TRY(npg_mesh_copy(&f->mesh, f->body.rest));
+    if (f->mesh->vert_normals) return NPG_OK;
+    return npg_alloc_array(&f->mesh->vert_normals, NPG_FOR_MESH, f->mesh->vert_count, 3 * sizeof(float));
+}
+
+void npg_moving_pose(npg_moving *f, const npg_moment *moment)
+{
+    npg_mesh *m = f->mesh;
+    f->kind->pose(&f->body, m->vert_pos, moment);
+    npg_mesh_vertex_normals(m->vert_normals, m->vert_pos, m->vert_count, m->faces, m->face_count);
+}
+
+void npg_moving_close(npg_moving *f)
+{
+    npg_mesh_unref(&f->mesh);
+    npg_mesh_unref(&f->body.rest);
+    npg_release(&f->body.weights);
+}

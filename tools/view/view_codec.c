@@ -1,5 +1,5 @@
 /* Codec of the page's numbers: prediction, planes of bytes, zlib. */
-#include "tools/view/view_internal.h"
+#include "tools/view/view.h"
 
 #include <math.h>
 #include <string.h>

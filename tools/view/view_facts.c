@@ -3,9 +3,7 @@
 
 #include "pipeline/json_file.h"
 #include "pipeline/plan.h"
-#include "tools/view/view_internal.h"
-
-enum { WARNINGS_MAX = 50 };
+#include "tools/view/view.h"
 
 /* ---- frames ---- */
 
@@ -88,17 +86,6 @@ static json_t *json_of_part(const npg_view_part *part)
     return out;
 }
 
-static json_t *json_of_warnings(const npg_view_part *part)
-{
-    size_t i;
-    json_t *out = json_array(), *warning;
-    json_array_foreach(json_object_get(part->report, "warnings"), i, warning)
-    {
-        if (i < WARNINGS_MAX) json_array_append(out, warning);
-    }
-    return out;
-}
-
 json_t *npg_view_result_json(const npg_view_result *result)
 {
     const npg_view_part *first = &result->parts[0];
@@ -108,7 +95,7 @@ json_t *npg_view_result_json(const npg_view_result *result)
     json_t *parts = json_array(), *warnings = json_array();
     for (size_t i = 0; i < result->part_count; i++) {
         json_array_append_new(parts, json_of_part(&result->parts[i]));
-        json_array_append_new(warnings, json_of_warnings(&result->parts[i]));
+        json_array_append(warnings, json_object_get(result->parts[i].report, "warnings"));
     }
     json_t *out = json_pack("{so so sb sf ss so so}", "name", npg_json_text(result->name), "path",
                             npg_json_text(result->path), "done", result->is_done, "fps",

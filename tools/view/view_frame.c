@@ -1,5 +1,5 @@
 /* Frame: meshes and points of a result as blocks of bytes for the page. */
-#include "tools/view/view_internal.h"
+#include "tools/view/view.h"
 
 #include <math.h>
 #include <string.h>
@@ -12,7 +12,7 @@ npg_status npg_view_frames_open(npg_view_frames *frames, const npg_view_part *pa
     *frames = (npg_view_frames){.arena = {.purpose = NPG_FOR_MESH}, .part = part, .point_limit = point_limit};
     frames->vert_pos = npg_arena_copy(&frames->arena, mesh->vert_pos, mesh->vert_count, 3 * sizeof(float));
     frames->seen = npg_arena_take(&frames->arena, mesh->vert_count, sizeof *frames->seen);
-    npg_status status = npg_view_take_colours(frames, mesh);
+    npg_status status = npg_arena_status(&frames->arena);
     if (status) npg_arena_release(&frames->arena);
     return status;
 }
@@ -100,56 +100,48 @@ static void predict_frame(const npg_view_links *links, int32_t *left, int32_t *c
 }
 
 /* Frames in turn, of which two are held at a time. */
-static npg_status pack_positions(npg_bytes *out, size_t *size, const npg_view_links *links,
+static npg_status pack_positions(npg_bytes *out, size_t *size, npg_arena *arena, const npg_view_links *links,
                                  const npg_view_grid *grid, const float *positions, size_t count)
 {
     size_t v = links->vert_count;
-    npg_arena scratch = {.purpose = NPG_FOR_MESH};
-    int32_t *rooms = npg_arena_take(&scratch, 7 * v, sizeof *rooms);
-    int32_t *left = npg_arena_take(&scratch, 3 * v * count, sizeof *left);
-    npg_status status = npg_arena_status(&scratch);
-    for (size_t t = 0; t < count && !status; t++) {
+    int32_t *rooms = npg_arena_take(arena, 7 * v, sizeof *rooms);
+    int32_t *left = npg_arena_take(arena, 3 * v * count, sizeof *left);
+    NPG_TRY(npg_arena_status(arena));
+    for (size_t t = 0; t < count; t++) {
         int32_t *now = rooms + 3 * v * (t % 2), *before = rooms + 3 * v * (1 - t % 2);
         npg_view_round(grid, now, positions + 3 * v * t, v);
         predict_frame(links, left + 3 * v * t, rooms + 6 * v, now, t ? before : NULL);
     }
-    if (!status) status = npg_view_pack(out, size, left, 3 * v * count);
-    npg_arena_release(&scratch);
-    return status;
+    return npg_view_pack(out, size, left, 3 * v * count);
 }
 
 /* Rows of V values, each predicted by itself. */
-static npg_status pack_rows(npg_bytes *out, size_t *size, const npg_view_links *links, const int32_t *rows,
-                            size_t count)
+static npg_status pack_rows(npg_bytes *out, size_t *size, npg_arena *arena, const npg_view_links *links,
+                            const int32_t *rows, size_t count)
 {
     size_t v = links->vert_count;
-    int32_t *left;
-    NPG_TRY(npg_alloc_array(&left, NPG_FOR_MESH, count * v, sizeof *left));
+    int32_t *left = npg_arena_take(arena, count * v, sizeof *left);
+    NPG_TRY(npg_arena_status(arena));
     for (size_t r = 0; r < count; r++) npg_view_predict(links, left + r * v, rows + r * v);
-    npg_status status = npg_view_pack(out, size, left, count * v);
-    npg_release(&left);
-    return status;
+    return npg_view_pack(out, size, left, count * v);
 }
 
-static npg_status pack_points(npg_bytes *out, size_t *size, const group *g)
+static npg_status pack_points(npg_bytes *out, size_t *size, group *g)
 {
-    npg_view_grid wide = g->grid;
-    int32_t *values;
-    wide.step *= NPG_VIEW_POINT_STEP;
-    NPG_TRY(npg_alloc_array(&values, NPG_FOR_FRAMES, g->point_total, 3 * sizeof *values));
+    const double step = g->grid.step * NPG_VIEW_POINT_STEP;
+    int32_t *values = npg_arena_take(&g->arena, g->point_total, 3 * sizeof *values);
+    NPG_TRY(npg_arena_status(&g->arena));
     for (size_t t = 0, at = 0; t < g->count; at += g->point_counts[t++])
         for (size_t a = 0; a < 3; a++) {
             int32_t before = 0, *row = values + 3 * at + a * g->point_counts[t];
             for (size_t i = 0; i < g->point_counts[t]; i++) {
-                double share = ((double)g->points[3 * (at + i) + a] - wide.origin[a]) / wide.step;
+                double share = ((double)g->points[3 * (at + i) + a] - g->grid.origin[a]) / step;
                 int32_t now = (int32_t)lrint(fmax(-NPG_VIEW_GRID_MAX, fmin(NPG_VIEW_GRID_MAX, share)));
                 row[i] = now - before;
                 before = now;
             }
         }
-    npg_status status = npg_view_pack(out, size, values, 3 * g->point_total);
-    npg_release(&values);
-    return status;
+    return npg_view_pack(out, size, values, 3 * g->point_total);
 }
 
 /* ---- blocks ---- */
@@ -169,7 +161,7 @@ static void set_sizes(npg_bytes *out, size_t at, const size_t *sizes, size_t cou
     }
 }
 
-static npg_status pack_group(npg_bytes *out, const group *g)
+static npg_status pack_group(npg_bytes *out, group *g)
 {
     const npg_view_part *part = g->frames->part;
     const uint32_t head[4] = {(uint32_t)g->count};
@@ -178,8 +170,8 @@ static npg_status pack_group(npg_bytes *out, const group *g)
     size_t at = out->size + 4;
     NPG_TRY(npg_bytes_add(out, head, sizeof head));
     NPG_TRY(npg_bytes_add(out, g->point_counts, g->count * sizeof *g->point_counts));
-    NPG_TRY(pack_positions(out, &sizes[0], &part->links, &g->grid, g->positions, g->count));
-    NPG_TRY(pack_rows(out, &sizes[1], &part->links, g->errors, g->count));
+    NPG_TRY(pack_positions(out, &sizes[0], &g->arena, &part->links, &g->grid, g->positions, g->count));
+    NPG_TRY(pack_rows(out, &sizes[1], &g->arena, &part->links, g->errors, g->count));
     NPG_TRY(pack_points(out, &sizes[2], g));
     set_sizes(out, at, sizes, 3);
     return NPG_OK;
@@ -197,45 +189,41 @@ npg_status npg_view_group_block(npg_bytes *out, npg_view_frames *frames, size_t 
     return status;
 }
 
-static npg_status pack_faces(npg_bytes *out, size_t *size, const npg_mesh *mesh)
+static npg_status pack_faces(npg_bytes *out, size_t *size, npg_arena *arena, const npg_mesh *mesh)
 {
-    int32_t *values;
-    NPG_TRY(npg_alloc_array(&values, NPG_FOR_MESH, mesh->face_count, 3 * sizeof *values));
+    int32_t *values = npg_arena_take(arena, mesh->face_count, 3 * sizeof *values);
+    NPG_TRY(npg_arena_status(arena));
     for (size_t i = 0; i < 3 * mesh->face_count; i++)
         values[i] = (int32_t)(mesh->faces[i] - (i ? mesh->faces[i - 1] : 0));
-    npg_status status = npg_view_pack(out, size, values, 3 * mesh->face_count);
-    npg_release(&values);
-    return status;
+    return npg_view_pack(out, size, values, 3 * mesh->face_count);
 }
 
-static npg_status pack_colours(npg_bytes *out, size_t *size, const npg_view_frames *frames)
+static npg_status pack_colours(npg_bytes *out, size_t *size, npg_arena *arena, const npg_view_part *part)
 {
-    size_t v = frames->part->reference->vert_count;
-    int32_t *rows;
-    *size = 0;
-    if (!frames->colours) return NPG_OK;
-    NPG_TRY(npg_alloc_array(&rows, NPG_FOR_MESH, v, 3 * sizeof *rows));
-    for (size_t i = 0; i < 3 * v; i++) rows[i % 3 * v + i / 3] = frames->colours[i];
-    npg_status status = pack_rows(out, size, &frames->part->links, rows, 3);
-    npg_release(&rows);
-    return status;
+    const npg_mesh *mesh = part->reference;
+    size_t v = mesh->vert_count;
+    int32_t *rows = npg_arena_take(arena, v, 3 * sizeof *rows);
+    NPG_TRY(npg_arena_status(arena));
+    for (size_t i = 0; i < 3 * v; i++) rows[i % 3 * v + i / 3] = mesh->vert_colours[i / 3 * 4 + i % 3];
+    return pack_rows(out, size, arena, &part->links, rows, 3);
 }
 
-npg_status npg_view_part_block(npg_bytes *out, const npg_view_frames *frames, bool with_counts)
+npg_status npg_view_part_block(npg_bytes *out, npg_view_frames *frames)
 {
     const npg_view_part *part = frames->part;
     const npg_mesh *mesh = part->reference;
     const uint32_t head[2] = {(uint32_t)mesh->vert_count, (uint32_t)mesh->face_count}, none[4] = {0};
     const npg_view_grid grid = grid_of_one(mesh->vert_pos, mesh->vert_count);
+    npg_arena *arena = &frames->arena;
     size_t sizes[4] = {0};
     NPG_TRY(npg_bytes_add(out, head, sizeof head));
     NPG_TRY(add_grid(out, &grid));
     size_t at = out->size;
     NPG_TRY(npg_bytes_add(out, none, sizeof none));
-    NPG_TRY(pack_faces(out, &sizes[0], mesh));
-    NPG_TRY(pack_positions(out, &sizes[1], &part->links, &grid, mesh->vert_pos, 1));
-    NPG_TRY(pack_colours(out, &sizes[2], frames));
-    if (with_counts && frames->with_points) NPG_TRY(pack_rows(out, &sizes[3], &part->links, frames->seen, 1));
+    NPG_TRY(pack_faces(out, &sizes[0], arena, mesh));
+    NPG_TRY(pack_positions(out, &sizes[1], arena, &part->links, &grid, mesh->vert_pos, 1));
+    if (mesh->vert_colours) NPG_TRY(pack_colours(out, &sizes[2], arena, part));
+    if (frames->with_points) NPG_TRY(pack_rows(out, &sizes[3], arena, &part->links, frames->seen, 1));
     set_sizes(out, at, sizes, 4);
     return NPG_OK;
 }

@@ -1,5 +1,5 @@
 /* Page: one HTML file that needs no other, of one result or of two side by side. */
-#include "tools/view/view_internal.h"
+#include "tools/view/view.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -109,7 +109,7 @@ static npg_status write_groups(npg_file *file, npg_view_frames *frames, const ch
         snprintf(id, sizeof id, "%s-%zu", part_id, first / part->group);
         if (!status) write_block(file, &block, id);
     }
-    if (!status) status = npg_view_part_block(&block, frames, true);
+    if (!status) status = npg_view_part_block(&block, frames);
     if (!status) write_block(file, &block, part_id);
     npg_release(&block.data);
     return status;

@@ -1,5 +1,5 @@
 /* Reading of one frame for a page. */
-#include "tools/view/view_internal.h"
+#include "tools/view/view.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -14,18 +14,6 @@
 
 /* ---- the mesh ---- */
 
-npg_status npg_view_take_colours(npg_view_frames *frames, const npg_mesh *mesh)
-{
-    if (!frames->colours && mesh->vert_colours)
-        frames->colours = npg_arena_take(&frames->arena, mesh->vert_count, 3);
-    else
-        mesh = NULL;
-    NPG_TRY(npg_arena_status(&frames->arena));
-    for (size_t i = 0; mesh && i < mesh->vert_count; i++)
-        memcpy(frames->colours + 3 * i, mesh->vert_colours + 4 * i, 3);
-    return NPG_OK;
-}
-
 static npg_status take_mesh(npg_view_frames *frames, const npg_mesh *mesh, const char *path)
 {
     const npg_mesh *reference = frames->part->reference;
@@ -35,7 +23,7 @@ static npg_status take_mesh(npg_view_frames *frames, const npg_mesh *mesh, const
                          v);
     NPG_TRY(npg_mesh_require_finite(mesh, path));
     memcpy(frames->vert_pos, mesh->vert_pos, 3 * v * sizeof *frames->vert_pos);
-    return npg_view_take_colours(frames, mesh);
+    return NPG_OK;
 }
 
 npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *frame)
@@ -119,19 +107,18 @@ static void judge_vertices(npg_view_frames *frames, int32_t *errors, const float
 npg_status npg_view_measure(npg_view_frames *frames, int32_t *errors)
 {
     size_t v = frames->part->reference->vert_count;
+    npg_arena scratch = {.purpose = NPG_FOR_QUERY};
     npg_kdtree *tree = NULL;
-    uint32_t *index = NULL;
-    float *dist_sq = NULL;
     memset(errors, 0, v * sizeof *errors);
     if (!frames->point_count) return NPG_OK;
-    npg_status status = npg_alloc_array(&index, NPG_FOR_QUERY, v, sizeof *index);
-    if (!status) status = npg_alloc_array(&dist_sq, NPG_FOR_QUERY, v, sizeof *dist_sq);
+    uint32_t *index = npg_arena_take(&scratch, v, sizeof *index);
+    float *dist_sq = npg_arena_take(&scratch, v, sizeof *dist_sq);
+    npg_status status = npg_arena_status(&scratch);
     if (!status) status = npg_kdtree_open(&tree, frames->points, frames->point_count);
     if (!status) status = npg_kdtree_nearest(tree, index, dist_sq, frames->vert_pos, v, 1, 0);
     if (!status) judge_vertices(frames, errors, dist_sq);
     npg_kdtree_close(&tree);
-    npg_release(&index);
-    npg_release(&dist_sq);
+    npg_arena_release(&scratch);
     return status;
 }
 

@@ -1,5 +1,5 @@
 /* Result: lists and references of a run, or of its segments. */
-#include "tools/view/view_internal.h"
+#include "tools/view/view.h"
 
 #include <errno.h>
 #include <math.h>
@@ -191,8 +191,7 @@ static npg_status set_name(npg_view_result *result)
 
 static npg_status check_folder(const char *path, bool may_be_empty)
 {
-    static const char *const traces[] = {"frames.jsonl", "frames.partial.jsonl", "segments.json",
-                                         "segments.partial.json"};
+    static const char *const traces[] = {"frames.jsonl", "frames.partial.jsonl", "segments.json"};
     struct stat info;
     if (stat(path, &info)) return npg_error(NPG_USAGE, "%s: %s", path, strerror(errno));
     if (!S_ISDIR(info.st_mode)) return npg_error(NPG_USAGE, "%s is not a folder", path);

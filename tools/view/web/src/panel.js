@@ -82,7 +82,7 @@ function notesOf(capture) {
         const name = capture.results.length > 1 ? `${"AB"[r]}: ` : "";
         const alarms = result.facts.parts.flatMap((part) => Object.values(part.alarm ?? {})).filter(Boolean);
         const texts = alarms.map((alarm) => `Alarm from frame ${alarm.from_frame}: ${alarm.cause}`);
-        for (const warning of result.facts.warnings.flat())
+        for (const warning of result.facts.warnings.flat().slice(0, 50))
             texts.push(
                 typeof warning === "string"
                     ? warning
