@@ -5,33 +5,16 @@
 
 #define CHANNELS ((size_t)NPG_LATENT_CHANNELS)
 
-size_t npg_mlp_at_head(const npg_mlp_shape *s)
+npg_mlp_places npg_mlp_places_of(const npg_mlp_shape *s)
 {
-    return s->w1 * s->w2;
-}
-size_t npg_mlp_at_b2(const npg_mlp_shape *s)
-{
-    return npg_mlp_at_head(s) + s->w2 * NPG_MLP_HEAD_ROW;
-}
-size_t npg_mlp_at_head_bias(const npg_mlp_shape *s)
-{
-    return npg_mlp_at_b2(s) + s->w2;
-}
-size_t npg_mlp_at_w1z(const npg_mlp_shape *s)
-{
-    return npg_mlp_at_head_bias(s) + NPG_MLP_HEAD_ROW;
-}
-size_t npg_mlp_at_w1t(const npg_mlp_shape *s)
-{
-    return npg_mlp_at_w1z(s) + CHANNELS * s->w1;
-}
-size_t npg_mlp_at_b1(const npg_mlp_shape *s)
-{
-    return npg_mlp_at_w1t(s) + s->code_size * s->w1;
-}
-size_t npg_mlp_param_count(const npg_mlp_shape *s)
-{
-    return npg_mlp_at_b1(s) + s->w1;
+    npg_mlp_places at = {.head = s->w1 * s->w2};
+    at.b2 = at.head + s->w2 * NPG_MLP_HEAD_ROW;
+    at.head_bias = at.b2 + s->w2;
+    at.w1z = at.head_bias + NPG_MLP_HEAD_ROW;
+    at.w1t = at.w1z + CHANNELS * s->w1;
+    at.b1 = at.w1t + s->code_size * s->w1;
+    at.end = at.b1 + s->w1;
+    return at;
 }
 
 size_t npg_mlp_packed(size_t rows, size_t row, size_t column)
@@ -54,7 +37,7 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
     const size_t f = sizeof(float);
     const npg_mlp_shape *s = &m->shape;
     size_t block = m->rows / m->blocks;
-    NPG_TRY(npg_buffer_open(&m->params, d, npg_mlp_param_count(s) * f));
+    NPG_TRY(npg_buffer_open(&m->params, d, npg_mlp_places_of(s).end * f));
     NPG_TRY(npg_buffer_open(&m->code, d, m->frames * s->code_size * f));
     NPG_TRY(npg_buffer_open(&m->z, d, m->rows * CHANNELS * f));
     NPG_TRY(npg_buffer_open(&m->out, d, m->frames * m->rows * NPG_MLP_OUT * f));
@@ -62,13 +45,13 @@ static npg_status open_buffers(npg_mlp *m, npg_device *d)
     NPG_TRY(npg_buffer_open(&m->c, d, m->frames * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->h2, d, m->batch * m->rows * s->w2 * f));
     NPG_TRY(npg_buffer_open(&m->scratch, d, m->groups * npg_mlp_scratch(s, block) * f));
-    NPG_TRY(npg_buffer_open(&m->grad, d, npg_mlp_param_count(s) * f));
+    NPG_TRY(npg_buffer_open(&m->grad, d, npg_mlp_places_of(s).end * f));
     NPG_TRY(npg_buffer_open(&m->dz, d, m->rows * CHANNELS * f));
     NPG_TRY(npg_buffer_open(&m->dout, d, m->frames * m->rows * NPG_MLP_OUT * f));
     NPG_TRY(npg_buffer_open(&m->dp, d, m->rows * s->w1 * f));
     NPG_TRY(npg_buffer_open(&m->dc, d, m->groups * m->frames * s->w1 * f));
-    NPG_TRY(npg_buffer_open(&m->sums, d, m->groups * npg_mlp_at_w1t(s) * f));
-    size_t transposed = npg_mlp_at_head(s) + s->w1 * CHANNELS + NPG_MLP_USED * s->w2;
+    NPG_TRY(npg_buffer_open(&m->sums, d, m->groups * npg_mlp_places_of(s).w1t * f));
+    size_t transposed = npg_mlp_places_of(s).head + s->w1 * CHANNELS + NPG_MLP_USED * s->w2;
     return npg_buffer_open(&m->transposed, d, transposed * f);
 }
 
@@ -113,8 +96,8 @@ npg_status npg_mlp_begin(npg_mlp *m)
 {
     size_t panels = widest(&m->shape) / NPG_PANEL;
     NPG_TRY(NPG_LAUNCH(m->time, "time_rows", m->shape.w1, m->frames, NPG_BUF(&m->c), NPG_BUF(&m->code),
-                       NPG_BUF(&m->params), NPG_INT(npg_mlp_at_w1t(&m->shape)), NPG_INT(m->shape.code_size),
-                       NPG_INT(m->shape.w1), NPG_INT(m->frames)));
+                       NPG_BUF(&m->params), NPG_INT(npg_mlp_places_of(&m->shape).w1t),
+                       NPG_INT(m->shape.code_size), NPG_INT(m->shape.w1), NPG_INT(m->frames)));
     NPG_TRY(NPG_LAUNCH_GROUPS(m->program, "mlp_input", m->groups, m->local, NPG_BUF(&m->p), NPG_BUF(&m->z),
                               NPG_BUF(&m->params), NPG_INT(m->blocks)));
     NPG_TRY(npg_buffer_zero(&m->sums));
@@ -141,7 +124,7 @@ npg_status npg_mlp_backward(npg_mlp *m, size_t first, size_t count)
 
 npg_status npg_mlp_end(npg_mlp *m)
 {
-    size_t at_w1t = npg_mlp_at_w1t(&m->shape);
+    size_t at_w1t = npg_mlp_places_of(&m->shape).w1t;
     NPG_TRY(NPG_LAUNCH_GROUPS(m->program, "mlp_input_back", m->groups, m->local, NPG_BUF(&m->dz),
                               NPG_BUF(&m->sums), NPG_BUF(&m->dp), NPG_BUF(&m->z), NPG_BUF(&m->transposed),
                               NPG_INT(m->blocks)));

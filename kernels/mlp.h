@@ -17,15 +17,11 @@ typedef struct npg_mlp_shape {
     size_t code_size; /* M, length of the time code                      */
 } npg_mlp_shape;
 
-size_t npg_mlp_param_count(const npg_mlp_shape *shape);
-
-/* Where parts of the list begin, but for W_2, which is first. */
-size_t npg_mlp_at_head(const npg_mlp_shape *shape);
-size_t npg_mlp_at_b2(const npg_mlp_shape *shape);
-size_t npg_mlp_at_head_bias(const npg_mlp_shape *shape);
-size_t npg_mlp_at_w1z(const npg_mlp_shape *shape);
-size_t npg_mlp_at_w1t(const npg_mlp_shape *shape);
-size_t npg_mlp_at_b1(const npg_mlp_shape *shape);
+/* Where parts of the list begin, but for W_2, which is first; and its end, which is how many there are. */
+typedef struct npg_mlp_places {
+    size_t head, b2, head_bias, w1z, w1t, b1, end;
+} npg_mlp_places;
+npg_mlp_places npg_mlp_places_of(const npg_mlp_shape *shape);
 
 /* Where element (row, column) of a packed matrix with `rows` rows lies. */
 size_t npg_mlp_packed(size_t rows, size_t row, size_t column);

@@ -93,13 +93,14 @@ static npg_status open_field(trial *t, const float *rest, const float *normals)
 static npg_status open_decoder(trial *t)
 {
     const npg_mlp_shape shape = {WIDTH, WIDTH / 2, CODE};
-    size_t count = npg_mlp_param_count(&shape), head = npg_mlp_at_head(&shape);
+    size_t count = npg_mlp_places_of(&shape).end, head = npg_mlp_places_of(&shape).head;
     float *params = draw(t, count, 0.2);
     const float *code = draw(t, FRAMES * CODE, 1);
     NPG_TRY(npg_arena_status(&t->arena));
-    for (size_t at = head; at < npg_mlp_at_w1z(&shape); at++) { /* columns past the used ones are zero */
-        bool is_bias = at >= npg_mlp_at_b2(&shape);
-        size_t column = is_bias ? at - npg_mlp_at_head_bias(&shape) : (at - head) % NPG_MLP_HEAD_ROW;
+    for (size_t at = head; at < npg_mlp_places_of(&shape).w1z;
+         at++) { /* columns past the used ones are zero */
+        bool is_bias = at >= npg_mlp_places_of(&shape).b2;
+        size_t column = is_bias ? at - npg_mlp_places_of(&shape).head_bias : (at - head) % NPG_MLP_HEAD_ROW;
         if (column >= NPG_MLP_USED && column < NPG_MLP_HEAD_ROW) params[at] = 0;
     }
     NPG_TRY(npg_mlp_open(&t->mlp, t->device, &shape, VERTS, FRAMES, FRAMES));
@@ -190,7 +191,7 @@ static npg_status go_back(trial *t)
     size_t nodes = t->levels.row_count * CHANNELS;
     NPG_TRY(npg_mlp_backward(&t->mlp, 0, FRAMES));
     NPG_TRY(npg_mlp_end(&t->mlp));
-    NPG_TRY(expect(t, &t->mlp.grad, npg_mlp_param_count(&t->mlp.shape), false));
+    NPG_TRY(expect(t, &t->mlp.grad, npg_mlp_places_of(&t->mlp.shape).end, false));
     NPG_TRY(expect(t, &t->mlp.dz, VERTS * CHANNELS, false));
     NPG_TRY(npg_latent_back(&t->latent, &t->dnodes, &t->mlp.dz, &t->mlp.z));
     NPG_TRY(expect(t, &t->dnodes, nodes, false));

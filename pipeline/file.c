@@ -158,6 +158,13 @@ npg_status npg_file_open(npg_file **out, const char *path)
     return status;
 }
 
+npg_status npg_file_open_in(npg_file **out, const char *folder, const char *name)
+{
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, folder, name));
+    return npg_file_open(out, path);
+}
+
 static npg_status keep_failure(npg_file *file, const char *verb)
 {
     file->status = npg_error_errno(NPG_DISK, "can't %s %s", verb, file->path);

@@ -15,6 +15,7 @@ typedef struct npg_file npg_file;
 
 /* NPG_DISK with path and cause. */
 npg_status npg_file_open(npg_file **file, const char *path);
+npg_status npg_file_open_in(npg_file **file, const char *folder, const char *name);
 
 /* A failed write is remembered: later calls do nothing and commit returns it, so callers may check once. */
 npg_status npg_file_write(npg_file *file, const void *data, size_t size);

@@ -93,6 +93,11 @@ json_t *npg_json_real(double value)
     return isfinite(value) ? json_real(value) : json_null();
 }
 
+json_t *npg_json_place(const double at[3])
+{
+    return json_pack("[ooo]", npg_json_real(at[0]), npg_json_real(at[1]), npg_json_real(at[2]));
+}
+
 npg_status npg_json_print(npg_file *file, const json_t *value, size_t flags)
 {
     char *text = json_dumps(value, flags);
@@ -104,10 +109,8 @@ npg_status npg_json_print(npg_file *file, const json_t *value, size_t flags)
 
 npg_status npg_json_write(const char *folder, const char *name, const json_t *value)
 {
-    char path[NPG_PATH_SIZE];
     npg_file *file;
-    NPG_TRY(npg_path_of(path, folder, name));
-    NPG_TRY(npg_file_open(&file, path));
+    NPG_TRY(npg_file_open_in(&file, folder, name));
     npg_status status = npg_json_print(file, value, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     if (!status) npg_file_write(file, "\n", 1);
     return npg_file_end(&file, status);

@@ -32,6 +32,9 @@ json_t *npg_json_at(const json_t *object, const char *names);
 /* A JSON number, or null for one that is not finite. */
 json_t *npg_json_real(double value);
 
+/* [x, y, z] of such numbers. */
+json_t *npg_json_place(const double at[3]);
+
 /* Write <folder>/<name>, a file that appears whole.  NPG_DISK, NPG_MEMORY. */
 npg_status npg_json_write(const char *folder, const char *name, const json_t *value);
 

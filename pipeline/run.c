@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -246,23 +247,14 @@ static npg_status start_threads(npg_run *run)
     return NPG_OK;
 }
 
-static const char *name_of(npg_pass pass)
-{
-    switch (pass) {
-    case NPG_PASS_MEASURE: return "measure";
-    case NPG_PASS_SCORE: return "score";
-    case NPG_PASS_CHOOSE: return "choose";
-    case NPG_PASS_FUSE: return "fuse";
-    case NPG_PASS_SOLVE: break;
-    }
-    return "solve";
-}
+/* In the order of their bits. */
+static const char *const pass_names[] = {"measure", "score", "solve", "choose", "fuse"};
 
 /* How busy the machine was, pass by pass: the list of the report. */
 static void report_pass(npg_run *run, const npg_busy *begun)
 {
     json_t *passes = json_object_get(run->report, "passes"), *entry = npg_busy_since(begun);
-    json_object_set_new(entry, "pass", json_string(name_of(run->pass)));
+    json_object_set_new(entry, "pass", json_string(pass_names[ffs((int)run->pass) - 1]));
     if (!passes) json_object_set_new(run->report, "passes", passes = json_array());
     json_array_append_new(passes, entry);
 }

@@ -124,25 +124,23 @@ npg_status npg_worker_publish(npg_worker *worker, const npg_fact_kind *kind, voi
     return status;
 }
 
-void *npg_worker_fact(const npg_worker *worker, const npg_fact_kind *kind)
+static void *read_fact(npg_run *run, const npg_fact_kind *kind, bool takes)
 {
-    npg_run *run = worker->run;
     pthread_mutex_lock(&run->lock);
-    const npg_published *fact = find_fact(run, kind);
+    npg_published *fact = find_fact(run, kind);
     void *value = fact ? fact->value : NULL;
+    if (fact && takes) fact->value = NULL;
     pthread_mutex_unlock(&run->lock);
     return value;
 }
 
+void *npg_worker_fact(const npg_worker *worker, const npg_fact_kind *kind)
+{
+    return read_fact(worker->run, kind, false);
+}
 void *npg_worker_take_fact(npg_worker *worker, const npg_fact_kind *kind)
 {
-    npg_run *run = worker->run;
-    pthread_mutex_lock(&run->lock);
-    npg_published *fact = find_fact(run, kind);
-    void *value = fact ? fact->value : NULL;
-    if (fact) fact->value = NULL;
-    pthread_mutex_unlock(&run->lock);
-    return value;
+    return read_fact(worker->run, kind, true);
 }
 
 npg_status npg_worker_open_latch(npg_worker *worker, npg_latch **latch, int64_t count)

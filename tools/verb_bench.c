@@ -102,7 +102,7 @@ static npg_status open_kernels(bench *b)
     if (b->device) return NPG_OK;
     b->batch = b->s.frames < BATCH ? (size_t)b->s.frames : BATCH;
     for (size_t t = 0; t < b->batch; t++) targets[t] = (npg_target){b->clouds[t].pos, b->clouds[t].count};
-    NPG_TRY(npg_device_open(&b->device, b->s.device));
+    NPG_TRY(npg_device_open(&b->device, b->s.device, NULL));
     size_t rows = npg_mlp_rows(b->device, m->vert_count);
     NPG_TRY(npg_mlp_open(&b->mlp, b->device, &decoder, rows, b->batch, b->batch));
     NPG_TRY(npg_mlp_begin(&b->mlp));

@@ -34,7 +34,7 @@ static json_t *json_of_device(size_t i, const npg_device_info *info)
     npg_device *device;
     char number[24];
     snprintf(number, sizeof number, "%zu", i);
-    npg_status status = npg_device_open(&device, number);
+    npg_status status = npg_device_open(&device, number, NULL);
     if (!status) status = npg_kernels_self_test(device);
     npg_device_close(&device);
     return json_pack("{s:s,s:s,s:s,s:i,s:I,s:s}", "name", info->name, "platform", info->platform, "version",

@@ -251,11 +251,6 @@ static npg_status choose_device(npg_device *device, const char *spec)
 
 /* ---- opening ---- */
 
-npg_status npg_device_open(npg_device **out, const char *spec)
-{
-    return npg_device_open_tuned(out, spec, NULL);
-}
-
 const npg_tuning *npg_device_tuning(const npg_device *device)
 {
     return device->tuning;
@@ -279,7 +274,7 @@ static npg_status fill_device(npg_device *device, const char *spec, const npg_tu
     return npg_cl_status(code, "clCreateCommandQueue");
 }
 
-npg_status npg_device_open_tuned(npg_device **out, const char *spec, const npg_tuning *tuning)
+npg_status npg_device_open(npg_device **out, const char *spec, const npg_tuning *tuning)
 {
     npg_device *device;
     *out = NULL;

@@ -27,11 +27,8 @@ npg_status npg_device_describe(size_t i, npg_device_info *info);
 
 /* Open a device.  spec: "auto" or "" (the first CPU device, else the first), "cpu", "gpu", its number in the
  * list, or a part of its name.  NPG_DEVICE names the devices there are when none fits.  Compiled kernels are
- * kept on disk, in a folder that one process uses at a time. */
-npg_status npg_device_open(npg_device **device, const char *spec);
-
-/* The same with this tuning, not that for its kind of device; a loan, and NULL: by kind. */
-npg_status npg_device_open_tuned(npg_device **device, const char *spec, const npg_tuning *tuning);
+ * kept on disk, in a folder that one process uses at a time.  tuning: a loan; NULL: that for its kind of device. */
+npg_status npg_device_open(npg_device **device, const char *spec, const npg_tuning *tuning);
 void npg_device_close(npg_device **device);
 const npg_device_info *npg_device_facts(const npg_device *device);
 const npg_tuning *npg_device_tuning(const npg_device *device);

@@ -281,11 +281,9 @@ json_t *npg_alarm_json(const npg_alarm_cause *cause)
 {
     char text[256];
     if (!cause) return json_null();
-    json_t *at = json_array();
     npg_alarm_text(text, sizeof text, cause);
-    for (int a = 0; a < 3; a++) json_array_append_new(at, npg_json_real(cause->at[a]));
     return json_pack("{sI sI ss sf sf sf sI so ss}", "from_frame", (json_int_t)cause->number, "from_index",
                      (json_int_t)cause->index, "figure", kinds[cause->misfit].name, "value", cause->value,
                      "usual", cause->usual, "bound", cause->bound, "frame", (json_int_t)cause->seen_number,
-                     "at", at, "cause", text);
+                     "at", npg_json_place(cause->at), "cause", text);
 }

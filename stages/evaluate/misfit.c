@@ -151,13 +151,6 @@ static npg_status take_flagged(npg_misfit *misfit, const npg_misfit_finder *f, c
     return NPG_OK;
 }
 
-static npg_status find_unsupported(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
-                                   double reach)
-{
-    flag_off(f, frame, reach);
-    return take_flagged(misfit, f, frame);
-}
-
 /* Of the surface that is off the points only what is stretched stays flagged. */
 static npg_status find_stretched(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame,
                                  double reach)
@@ -224,6 +217,7 @@ npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_
     NPG_TRY(find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link));
     if (!f->is_closed) return NPG_OK;
     find_vacated(f, &misfits[NPG_MISFIT_VACATED], frame);
-    NPG_TRY(find_unsupported(f, &misfits[NPG_MISFIT_UNSUPPORTED], frame, reach));
+    flag_off(f, frame, reach);
+    NPG_TRY(take_flagged(&misfits[NPG_MISFIT_UNSUPPORTED], f, frame));
     return find_stretched(f, &misfits[NPG_MISFIT_STRETCHED], frame, OFF_SHARE * reach);
 }

@@ -42,12 +42,8 @@ typedef struct applying {
 
 static npg_status check_job(applying *a)
 {
-    static const char *const traces[] = {"reference.ply", "frames.jsonl", "frames.partial.jsonl",
-                                         "job/job.json"};
-    bool is_job = false;
-    for (size_t i = 0; i < sizeof traces / sizeof *traces; i++)
-        is_job = is_job || npg_is_in_folder(a->s->job, traces[i]);
-    if (!is_job) return npg_error(NPG_USAGE, "%s is not the output folder of neupig run", a->s->job);
+    if (!npg_folder_has_run(a->s->job))
+        return npg_error(NPG_USAGE, "%s is not the output folder of neupig run", a->s->job);
     if (!npg_is_in_folder(a->s->job, "done.json") || !npg_is_in_folder(a->s->job, "frames.jsonl"))
         return npg_error(NPG_BAD_INPUT, "%s: the run is not finished (there is no %s); run it again first",
                          a->s->job, npg_is_in_folder(a->s->job, "done.json") ? "frames.jsonl" : "done.json");

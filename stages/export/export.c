@@ -16,14 +16,14 @@ typedef enum numbering { NUMBER_OF_FILE, NUMBER_OF_INDEX } numbering;
 typedef struct export_state {
     /* options */
     int numbering, up, unit;
-    const char *prefix, *axes, *exports;
-    double scale, fps, voxel_share;
-    bool overwrite, with_normals, is_centred;
+    const char *axes, *exports;
+    double scale;
+    bool overwrite, is_centred;
+    npg_export_facts facts; /* prefix, fps, voxel_share and has_normals are options */
     /* of a pass */
     npg_placement map;
     npg_mesh_names names;
     npg_export_choice choice;
-    const char *like; /* the user's own reference where it is OBJ: its lines are kept in OBJ files */
     int64_t *numbers; /* of all frames, while measuring; owned */
     size_t number_count, number_capacity;
     npg_frame_log *list;
@@ -59,11 +59,12 @@ static npg_status read_options(npg_worker *worker)
     const char *reference = npg_worker_settings(worker)->reference, *format = NULL;
     NPG_TRY(npg_placement_parse(&state->map, state->axes));
     state->map.scale = state->scale;
-    NPG_TRY(check_prefix(state->prefix));
+    NPG_TRY(check_prefix(state->facts.prefix));
     NPG_TRY(npg_exporters_choose(&state->choice, state->exports));
     if (reference[0]) format = npg_reader_for(reference);
-    state->like = format && !strcmp(format, "obj") ? reference : NULL;
-    state->names = (npg_mesh_names){state->prefix, state->choice.is_obj ? "obj" : "ply", 4};
+    /* the user's own reference where it is OBJ: its lines are kept in OBJ files */
+    state->facts.like = format && !strcmp(format, "obj") ? reference : NULL;
+    state->names = (npg_mesh_names){state->facts.prefix, state->choice.is_obj ? "obj" : "ply", 4};
     return NPG_OK;
 }
 
@@ -163,30 +164,26 @@ static npg_status check_for_live(const npg_worker *worker)
 static const double metres_per_unit[] = {1, 0.1, 0.01, 0.001, 1000, 0.0254, 0.3048};
 
 /* What formats may know; before the reference is there, counts are those that the run will have at most. */
-static npg_export_facts export_facts(const npg_worker *worker)
+static npg_export_facts *export_facts(const npg_worker *worker)
 {
-    const export_state *state = npg_worker_state(worker);
+    export_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_frame_box *box = &facts->box;
-    size_t verts = facts->reference ? facts->reference->vert_count : npg_worker_verts_at_most(worker);
-    bool is_known = box->scale > 0;
-    return (npg_export_facts){.output = output_of(worker),
-                              .prefix = state->prefix,
-                              .width = state->names.width,
-                              .vert_count = verts,
-                              .face_count = facts->reference ? facts->reference->face_count : 2 * verts,
-                              .like = state->like,
-                              .turns_faces = state->map.is_mirror,
-                              .has_normals = state->with_normals,
-                              .pose_count = facts->frame_count,
-                              .last_index = facts->frame_count > 0 ? facts->frame_count - 1 : 0,
-                              .fps = state->fps,
-                              .metres_per_unit = metres_per_unit[state->unit],
-                              .is_z_up = state->up,
-                              .largest = is_known ? npg_place_largest(&state->map, box) : 0,
-                              .diagonal = is_known ? state->scale * box->diagonal : 0,
-                              .longest = is_known ? state->scale * 2 * NPG_UNIT_EXTENT / box->scale : 0,
-                              .voxel_share = state->voxel_share};
+    npg_export_facts *f = &state->facts;
+    f->output = output_of(worker);
+    f->width = state->names.width;
+    f->vert_count = facts->reference ? facts->reference->vert_count : npg_worker_verts_at_most(worker);
+    f->face_count = facts->reference ? facts->reference->face_count : 2 * f->vert_count;
+    f->turns_faces = state->map.is_mirror;
+    f->pose_count = facts->frame_count;
+    f->last_index = facts->frame_count > 0 ? facts->frame_count - 1 : 0;
+    f->metres_per_unit = metres_per_unit[state->unit];
+    f->is_z_up = state->up;
+    if (!(box->scale > 0)) return f;
+    f->largest = npg_place_largest(&state->map, box);
+    f->diagonal = state->scale * box->diagonal;
+    f->longest = state->scale * 2 * NPG_UNIT_EXTENT / box->scale;
+    return f;
 }
 
 /* About what the meshes and formats take: binary PLY, or OBJ text with its longer numbers.
@@ -198,11 +195,10 @@ static uint64_t bytes_of_meshes(const npg_worker *worker)
     bool is_obj = state->choice.is_obj;
     uint64_t verts = npg_worker_verts_at_most(worker), per_vert = is_obj ? 30 : 12;
     if (facts->frame_count < 0 || npg_worker_settings(worker)->reference[0]) return 0;
-    if (state->with_normals) per_vert *= 2;
+    if (state->facts.has_normals) per_vert *= 2;
     if (npg_worker_settings(worker)->colour != NPG_COLOUR_NO) per_vert += 4; /* if there are any */
-    npg_export_facts of_exports = export_facts(worker);
     return (uint64_t)facts->frame_count * verts * (per_vert + 2 * (is_obj ? 20 : 13)) +
-           npg_exporters_bytes(&state->choice, &of_exports);
+           npg_exporters_bytes(&state->choice, export_facts(worker));
 }
 
 /* What a format can't hold is refused before the fit starts; of a live source as soon as its box is known. */
@@ -210,25 +206,11 @@ static npg_status check_exporters(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
     set_centre(state, &npg_worker_facts(worker)->box);
-    npg_export_facts of_exports = export_facts(worker);
-    return npg_exporters_check(&state->choice, &of_exports);
-}
-
-static npg_status prepare_folder(npg_worker *worker)
-{
-    export_state *state = npg_worker_state(worker);
-    const char *output = output_of(worker);
-    npg_job *job = npg_job_of(worker);
-    NPG_TRY(check_exporters(worker));
-    NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
-    NPG_TRY(npg_folder_clear(output));
-    NPG_TRY(npg_export_folder(output, "meshes"));
-    NPG_TRY(npg_frame_log_open(&state->list, output));
-    return job ? npg_job_write(job, npg_exporters_has(&state->choice, "vdb")) : NPG_OK;
+    return npg_exporters_check(&state->choice, export_facts(worker));
 }
 
 /* What an earlier run of the same job wrote stays. */
-static npg_status resume_folder(npg_worker *worker)
+static npg_status open_folder(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
     const char *output = output_of(worker);
@@ -237,9 +219,15 @@ static npg_status resume_folder(npg_worker *worker)
     NPG_TRY(check_exporters(worker));
     NPG_TRY(npg_folder_probe(output));
     NPG_TRY(npg_folder_has_room(output, bytes_of_meshes(worker)));
-    npg_job_exported(job, &count, &bytes);
-    NPG_TRY(npg_frame_log_resume(&state->list, output, bytes, &state->mesh_count, &state->skipped_count));
-    return npg_job_write(job, npg_exporters_has(&state->choice, "vdb"));
+    if (npg_worker_facts(worker)->is_resumed) {
+        npg_job_exported(job, &count, &bytes);
+        NPG_TRY(npg_frame_log_resume(&state->list, output, bytes, &state->mesh_count, &state->skipped_count));
+    } else {
+        NPG_TRY(npg_folder_clear(output));
+        NPG_TRY(npg_export_folder(output, "meshes"));
+        NPG_TRY(npg_frame_log_open(&state->list, output));
+    }
+    return job ? npg_job_write(job, npg_exporters_has(&state->choice, "vdb")) : NPG_OK;
 }
 
 static npg_status write_mesh(npg_worker *worker, const char *file, const float *vert_unit,
@@ -337,8 +325,8 @@ static npg_status export_frame(npg_worker *worker, const npg_frame *frame)
                          (long long)frame->number, frame->vert_count, reference ? reference->vert_count : 0);
     if (!state->faces) NPG_TRY(begin_meshes(worker));
     npg_mesh_name(file + strlen(file), &state->names, number_of(state, frame));
-    NPG_TRY(write_mesh(worker, file, frame->vert_unit, frame->vert_colours, state->with_normals,
-                       state->choice.is_obj ? state->like : NULL));
+    NPG_TRY(write_mesh(worker, file, frame->vert_unit, frame->vert_colours, state->facts.has_normals,
+                       state->choice.is_obj ? state->facts.like : NULL));
     state->mesh_count++;
     return list_frame(worker, frame, file);
 }
@@ -348,7 +336,7 @@ static void report_settings(json_t *object, const export_state *state)
     const double *c = state->map.centre;
     json_object_update_new(object,
                            json_pack("{ss sf ss sf ss sf so}", "format", state->names.ending, "scale",
-                                     state->scale, "axes", state->axes, "fps", state->fps, "up",
+                                     state->scale, "axes", state->axes, "fps", state->facts.fps, "up",
                                      state->up ? "z" : "y", "metres_per_unit", metres_per_unit[state->unit],
                                      "forms", npg_exporters_json(&state->choice)));
     if (state->is_centred) json_object_set_new(object, "centre", json_pack("[fff]", c[0], c[1], c[2]));
@@ -383,15 +371,15 @@ static npg_status write_exports(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
     npg_export_watch watch = {.should_stop = npg_worker_should_stop, .user = worker};
-    if (!npg_exporters_any(&state->choice)) return NPG_OK;
+    if (!state->choice.chosen[0]) return NPG_OK;
     if (!state->faces) NPG_TRY(begin_meshes(worker));
-    npg_export_facts facts = export_facts(worker);
-    npg_status status = place_reference(worker, &facts);
-    if (!status && facts.has_pose_colours && npg_exporters_has(&state->choice, "glb"))
+    npg_export_facts *facts = export_facts(worker);
+    npg_status status = place_reference(worker, facts);
+    if (!status && facts->has_pose_colours && npg_exporters_has(&state->choice, "glb"))
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "motion.glb has the reference's colours: morph targets of colours are an option of "
                        "glTF that few programs read");
-    if (!status) status = npg_exporters_write(&state->choice, &facts, &watch);
+    if (!status) status = npg_exporters_write(&state->choice, facts, &watch);
     if (!status && watch.repeated)
         npg_worker_warn(worker, false, -1,
                         "%lld frames without a mesh repeat the one before them in pc2 and mdd, "
@@ -441,7 +429,7 @@ static npg_status conclude(npg_worker *worker)
                   json_object_get(npg_worker_report(worker), "meshes"));
     report_settings(head, state);
     json_object_set_new(head, "options", json_of_options(npg_worker_options(worker)));
-    npg_status status = npg_done_end(output, head, npg_exporters_any(&state->choice));
+    npg_status status = npg_done_end(output, head, state->choice.chosen[0]);
     json_decref(head);
     return status ? status : npg_job_end(npg_job_of(worker));
 }
@@ -462,7 +450,6 @@ static npg_status check_own(const npg_worker *worker)
 
 static npg_status init(npg_worker *worker)
 {
-    const npg_facts *facts = npg_worker_facts(worker);
     NPG_TRY(read_options(worker));
     if (!output_of(worker)[0]) return NPG_OK;
     NPG_TRY(check_reference(worker));
@@ -471,8 +458,7 @@ static npg_status init(npg_worker *worker)
         NPG_TRY(npg_folder_probe(output_of(worker)));
         NPG_TRY(check_for_live(worker));
     }
-    if (npg_worker_pass(worker) != NPG_PASS_SOLVE) return NPG_OK;
-    return facts->is_resumed ? resume_folder(worker) : prepare_folder(worker);
+    return npg_worker_pass(worker) == NPG_PASS_SOLVE ? open_folder(worker) : NPG_OK;
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
@@ -521,7 +507,7 @@ static const npg_option options[] = {
     NPG_ROW_TEXT(         "export",       AT(exports),      "",      "LIST",
         "What to write: ply, obj, pc2, mdd, glb, usda, npz, vdb, with commas. A sequence is always there: "
         "PLY, or OBJ where the list has obj without ply"),
-    NPG_ROW_TEXT(         "prefix",       AT(prefix),       "frame", "NAME",
+    NPG_ROW_TEXT(         "prefix",       AT(facts.prefix),       "frame", "NAME",
         "First part of the mesh files' names"),
     NPG_ROW_CHOICE(       "numbering",    AT(numbering),    "file",  "file|index",
         "Number of a mesh file. As in the input's name, or the place in the sequence"),
@@ -529,7 +515,7 @@ static const npg_option options[] = {
         "Multiply all written coordinates by this"),
     NPG_ROW_TEXT(         "axes",         AT(axes),         "xyz",   "AXES",
         "Which input axis becomes x, y and z, with signs. xz-y turns z up into y up"),
-    NPG_ROW_REAL(         "fps",          AT(fps),          "30",    1e-3,  1e6,  NULL,
+    NPG_ROW_REAL(         "fps",          AT(facts.fps),          "30",    1e-3,  1e6,  NULL,
         "Frames per second of the capture. For the report and formats that carry time"),
     NPG_ROW_CHOICE(       "up",           AT(up),           "y",     "y|z",
         "Axis that points up in the written coordinates. For exporters that record it"),
@@ -538,9 +524,9 @@ static const npg_option options[] = {
     NPG_ROW_FLAG(         "centre",       AT(is_centred),   "no",
         "Write coordinates from the middle of the capture's box. done.json then names it: for captures far "
         "from 0"),
-    NPG_PROGRAM_ROW(REAL, "vdb-voxel",    AT(voxel_share),  "0.005", 1e-4,  0.25, "SHARE",
+    NPG_PROGRAM_ROW(REAL, "vdb-voxel",    AT(facts.voxel_share),  "0.005", 1e-4,  0.25, "SHARE",
         "Voxel of the level sets, as a share of the longest side of the capture's box"),
-    NPG_PROGRAM_ROW(FLAG, "mesh-normals", AT(with_normals), "no",
+    NPG_PROGRAM_ROW(FLAG, "mesh-normals", AT(facts.has_normals), "no",
         "Write vertex normals into every mesh"),
     NPG_ROW_FLAG(         "overwrite",    AT(overwrite),    "no",
         "Remove meshes that another run left in the output folder"),

@@ -47,7 +47,7 @@ static npg_status print_done(npg_file *file, const json_t *head, const json_t *f
 npg_status npg_done_write(const char *output, const json_t *head, const json_t *files)
 {
     npg_file *file;
-    NPG_TRY(npg_export_open(&file, output, "done.json"));
+    NPG_TRY(npg_file_open_in(&file, output, "done.json"));
     npg_status printed = print_done(file, head, files), status = npg_file_end(&file, printed);
     if (!printed && status) npg_file_remove(output, "done.json");
     return status;

@@ -106,13 +106,16 @@ static npg_status refuse_foreign(void *user, const char *folder, const char *nam
                      folder, name);
 }
 
+bool npg_folder_has_run(const char *output)
+{
+    return npg_is_in_folder(output, "done.json") || npg_is_in_folder(output, "frames.jsonl") ||
+           npg_is_in_folder(output, NPG_FRAME_LOG_NAME) || npg_is_in_folder(output, "job/job.json");
+}
+
 npg_status npg_folder_check(const char *output, const npg_mesh_names *names, const int64_t *numbers,
                             size_t number_count)
 {
-    static const char *const traces[] = {"done.json", "frames.jsonl", NPG_FRAME_LOG_NAME, "job/job.json"};
-    own_meshes own = {false, names, numbers, number_count};
-    for (size_t i = 0; i < sizeof traces / sizeof *traces; i++)
-        own.are_ours = own.are_ours || npg_is_in_folder(output, traces[i]);
+    own_meshes own = {npg_folder_has_run(output), names, numbers, number_count};
     return each_mesh(output, refuse_foreign, &own);
 }
 

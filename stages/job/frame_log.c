@@ -36,13 +36,6 @@ static json_t *json_of_cleaning(const npg_cleaning *c)
                      "normals_estimated", (json_int_t)c->normals_estimated);
 }
 
-static json_t *json_of_place(const double at[3])
-{
-    json_t *place = json_array();
-    for (int a = 0; a < 3; a++) json_array_append_new(place, npg_json_real(at[a]));
-    return place;
-}
-
 /* clang-format off */
 const npg_figure_row npg_figure_rows[NPG_FIGURE_ROWS] = {
     {"point_dist_median", offsetof(npg_figures, point_dist_median), false},
@@ -65,7 +58,7 @@ static json_t *json_of_figures(const npg_figures *f)
     for (int i = 0; i < NPG_FIGURE_ROWS; i++)
         json_object_set_new(figures, npg_figure_rows[i].name,
                             npg_json_real(*npg_figure_at((npg_figures *)f, i)));
-    json_object_set_new(figures, "unsupported_at", json_of_place(f->unsupported_at));
+    json_object_set_new(figures, "unsupported_at", npg_json_place(f->unsupported_at));
     return figures;
 }
 
@@ -78,7 +71,7 @@ static json_t *json_of_misfits(const npg_figures *f)
         const npg_misfit *misfit = &f->misfits[i];
         json_object_set_new(
             misfits, misfit_names[i],
-            json_pack("{so so}", "share", npg_json_real(misfit->share), "at", json_of_place(misfit->at)));
+            json_pack("{so so}", "share", npg_json_real(misfit->share), "at", npg_json_place(misfit->at)));
     }
     return misfits;
 }
@@ -283,34 +276,10 @@ const npg_fact_kind npg_fact_late_faults = {"late_faults", "evaluate", release_l
 npg_status npg_frame_log_finish(npg_frame_log *list, const npg_facts *facts, const npg_late_faults *late)
 {
     npg_file *file;
-    char path[NPG_PATH_SIZE];
     if (list->line_count) qsort(list->lines, list->line_count, sizeof *list->lines, by_index);
-    NPG_TRY(npg_path_of(path, list->output, "frames.jsonl"));
-    NPG_TRY(npg_file_open(&file, path));
+    NPG_TRY(npg_file_open_in(&file, list->output, "frames.jsonl"));
     npg_status status = copy_lines(list, file, facts, late);
     return npg_file_end(&file, status);
-}
-
-/* ---- the log that goes with a state ---- */
-
-npg_status npg_frame_log_sync(const char *output, int64_t bytes, uint64_t *hash)
-{
-    char path[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(path, output, NPG_FRAME_LOG_NAME));
-    int fd = open(path, O_RDWR | O_CLOEXEC);
-    npg_status status = NPG_OK;
-    if (fd < 0 || fdatasync(fd)) status = npg_error_errno(NPG_DISK, "can't sync %s", path);
-    if (fd >= 0) close(fd);
-    return status ? status : npg_hash_file(hash, path, (uint64_t)bytes);
-}
-
-npg_status npg_frame_log_check(const char *output, int64_t bytes, uint64_t hash)
-{
-    uint64_t now;
-    char path[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(path, output, NPG_FRAME_LOG_NAME));
-    NPG_TRY(npg_hash_file(&now, path, (uint64_t)bytes));
-    return now == hash ? NPG_OK : npg_error(NPG_BAD_INPUT, "%s was changed since it was written", path);
 }
 
 /* ---- appended frames ---- */
@@ -332,9 +301,7 @@ npg_status npg_frame_log_shorten(const char *output, int64_t below, int64_t *lin
 {
     const char *from = npg_is_in_folder(output, "frames.jsonl") ? "frames.jsonl" : NPG_FRAME_LOG_NAME;
     shortened list = {.below = below};
-    char path[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(path, output, NPG_FRAME_LOG_NAME));
-    NPG_TRY(npg_file_open(&list.file, path));
+    NPG_TRY(npg_file_open_in(&list.file, output, NPG_FRAME_LOG_NAME));
     npg_status status = npg_json_lines(output, from, -1, keep_line, &list);
     *lines = list.lines;
     *bytes = (int64_t)npg_file_size(list.file);

@@ -152,12 +152,6 @@ static inline double *npg_figure_at(npg_figures *figures, int row)
 /* Figures that a line has; its misfits and marks exactly as they were, NaN where it has none. */
 void npg_frame_line_read(npg_figures *figures, const json_t *line);
 
-/* Their bytes on disk for good, and their checksum.  NPG_DISK. */
-npg_status npg_frame_log_sync(const char *output, int64_t bytes, uint64_t *hash);
-
-/* NPG_BAD_INPUT where the first `bytes` bytes have another checksum. */
-npg_status npg_frame_log_check(const char *output, int64_t bytes, uint64_t hash);
-
 /* Make OUT/frames.partial.jsonl of the frames before index `below` from the whole list of a run that is done
  * (or from the partial one, where this was broken off), which goes. */
 npg_status npg_frame_log_shorten(const char *output, int64_t below, int64_t *lines, int64_t *bytes);

@@ -113,11 +113,15 @@ static npg_status check_log(const npg_job *job, const npg_record *record)
 {
     npg_job_log log;
     int64_t planned;
+    uint64_t now;
+    char path[NPG_PATH_SIZE];
     NPG_TRY(npg_record_get(record, "planned", &planned, sizeof planned));
     /* frames are being appended: the log is made anew from that of the frames done */
     if (planned < (int64_t)json_array_size(json_object_get(job->then, "frames"))) return NPG_OK;
     NPG_TRY(npg_record_get(record, "log", &log, sizeof log));
-    return npg_frame_log_check(job->output, log.bytes, log.hash);
+    NPG_TRY(npg_path_of(path, job->output, NPG_FRAME_LOG_NAME));
+    NPG_TRY(npg_hash_file(&now, path, (uint64_t)log.bytes));
+    return now == log.hash ? NPG_OK : npg_error(NPG_BAD_INPUT, "%s was changed since it was written", path);
 }
 
 /* Of a live source: what had come is there. */

@@ -1,7 +1,9 @@
 /* Job: a state to the job's folder, and the facts of the run back. */
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "ingest/ingest.h"
 #include "job/job_internal.h"
@@ -44,8 +46,15 @@ static npg_status put_facts(npg_store *out, npg_worker *worker)
 static npg_status put_log(npg_store *out, const npg_worker *worker, int64_t emitted)
 {
     npg_job_log log = {.count = emitted};
+    char path[NPG_PATH_SIZE];
+    NPG_TRY(npg_path_of(path, npg_worker_settings(worker)->output, NPG_FRAME_LOG_NAME));
     NPG_TRY(npg_job_wait_exported(npg_job_of(worker), emitted, &log.bytes));
-    NPG_TRY(npg_frame_log_sync(npg_worker_settings(worker)->output, log.bytes, &log.hash));
+    int fd = open(path, O_RDWR | O_CLOEXEC);
+    npg_status status = NPG_OK;
+    if (fd < 0 || fdatasync(fd)) status = npg_error_errno(NPG_DISK, "can't sync %s", path);
+    if (fd >= 0) close(fd);
+    NPG_TRY(status);
+    NPG_TRY(npg_hash_file(&log.hash, path, (uint64_t)log.bytes));
     return npg_store_put(out, "log", &log, sizeof log);
 }
 

@@ -139,7 +139,7 @@ static npg_status open_device(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     bool is_measuring = npg_worker_pass(worker) == NPG_PASS_MEASURE;
-    NPG_TRY(npg_device_open(&s->device, npg_worker_settings(worker)->device));
+    NPG_TRY(npg_device_open(&s->device, npg_worker_settings(worker)->device, NULL));
     if (is_measuring || is_resumed(worker)) NPG_TRY(npg_kernels_self_test(s->device));
     if (is_measuring) return NPG_OK;
     const npg_device_info *info = npg_device_facts(s->device);

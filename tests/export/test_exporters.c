@@ -133,13 +133,13 @@ static void the_list_says_what_is_made(void **state)
     (void)state;
     assert_int_equal(npg_exporters_choose(&choice, ""), NPG_OK);
     assert_false(choice.is_obj);
-    assert_false(npg_exporters_any(&choice));
+    assert_false(choice.chosen[0]);
     assert_int_equal(npg_exporters_choose(&choice, "obj"), NPG_OK);
     assert_true(choice.is_obj); /* alone it is the sequence itself */
-    assert_false(npg_exporters_any(&choice));
+    assert_false(choice.chosen[0]);
     assert_int_equal(npg_exporters_choose(&choice, "obj,ply"), NPG_OK);
     assert_false(choice.is_obj);
-    assert_true(npg_exporters_any(&choice));
+    assert_true(choice.chosen[0]);
     json_t *names = npg_exporters_json(&choice);
     assert_int_equal(json_array_size(names), 2);
     json_decref(names);

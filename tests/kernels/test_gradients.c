@@ -137,7 +137,7 @@ static double value_of_decoder(void *user)
 static void mlp(void **state)
 {
     decoder d = {.shape = {64, 96, 2}};
-    size_t count = npg_mlp_param_count(&d.shape);
+    size_t count = npg_mlp_places_of(&d.shape).end;
     double error = 0, *grad = zeros(count), *dz = zeros(CHANNELS);
     (void)state;
     d.params = drawn(count, 0.125);

@@ -42,8 +42,7 @@ static void ops_agree_with_the_parameters_of_other_devices(void **state)
     (void)state;
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
         npg_device *other;
-        if (npg_device_open_tuned(&other, "auto", sets[i]))
-            fail_msg("%s: %s", sets[i]->name, npg_error_text());
+        if (npg_device_open(&other, "auto", sets[i])) fail_msg("%s: %s", sets[i]->name, npg_error_text());
         assert_ptr_equal(npg_device_tuning(other), sets[i]);
         print_message("%s:\n", sets[i]->name);
         check_all(other, sizes, 3);
@@ -100,7 +99,7 @@ static void unknown_device_is_named(void **state)
 {
     npg_device *none;
     (void)state;
-    assert_int_equal(npg_device_open(&none, "no such device"), NPG_DEVICE);
+    assert_int_equal(npg_device_open(&none, "no such device", NULL), NPG_DEVICE);
     assert_non_null(strstr(npg_error_text(), "no such device"));
     assert_null(none);
 }

@@ -75,7 +75,7 @@ static void spoil(const struct change *change)
 static npg_status self_test(void)
 {
     npg_device *device;
-    if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
+    if (npg_device_open(&device, "auto", NULL)) fail_msg("%s", npg_error_text());
     npg_status status = npg_kernels_self_test(device);
     npg_device_close(&device);
     return status;
@@ -117,11 +117,11 @@ static void a_binary_in_the_cache_belongs_to_its_text(void **state)
     (void)state;
     mend_all();
     spoil(&changes[sizeof changes / sizeof *changes - 1]);
-    if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
+    if (npg_device_open(&device, "auto", NULL)) fail_msg("%s", npg_error_text());
     assert_int_equal(npg_program_open(&program, device, "isometry", ""), NPG_OK);
     mend_all();
     npg_device_close(&device);
-    if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
+    if (npg_device_open(&device, "auto", NULL)) fail_msg("%s", npg_error_text());
     if (npg_kernels_self_test(device)) fail_msg("%s", npg_error_text());
     npg_device_close(&device);
 }

@@ -10,7 +10,7 @@ static npg_device *device;
 static int open_device(void **state)
 {
     (void)state;
-    if (npg_device_open(&device, "auto")) fail_msg("%s", npg_error_text());
+    if (npg_device_open(&device, "auto", NULL)) fail_msg("%s", npg_error_text());
     return 0;
 }
 

@@ -42,7 +42,7 @@ static npg_status refuse_name(const char *name, size_t length)
 
 npg_status npg_exporters_choose(npg_export_choice *choice, const char *list)
 {
-    bool has_ply = false;
+    bool has_ply = false, is_chosen[NPG_EXPORTERS_MAX] = {false};
     int obj = find_exporter("obj", 3);
     *choice = (npg_export_choice){0};
     for (const char *name = list; *name;) {
@@ -51,33 +51,30 @@ npg_status npg_exporters_choose(npg_export_choice *choice, const char *list)
         bool is_ply = length == 3 && !strncmp(name, "ply", 3);
         if (at < 0 && !is_ply) return refuse_name(name, length);
         has_ply = has_ply || is_ply;
-        if (at >= 0) choice->is_chosen[at] = true;
+        if (at >= 0) is_chosen[at] = true;
         name += length;
         if (*name == ',' && !*++name) return refuse_name(name, 0);
     }
-    choice->is_obj = !has_ply && choice->is_chosen[obj];
-    choice->is_chosen[obj] = has_ply && choice->is_chosen[obj];
+    choice->is_obj = !has_ply && is_chosen[obj];
+    is_chosen[obj] = has_ply && is_chosen[obj];
+    for (int i = 0, count = 0; npg_exporters[i]; i++)
+        if (is_chosen[i]) choice->chosen[count++] = npg_exporters[i];
     return NPG_OK;
 }
 
 bool npg_exporters_has(const npg_export_choice *choice, const char *name)
 {
-    return choice->is_chosen[find_exporter(name, strlen(name))];
-}
-
-bool npg_exporters_any(const npg_export_choice *choice)
-{
-    for (int i = 0; npg_exporters[i]; i++)
-        if (choice->is_chosen[i]) return true;
-    return false;
+    int i = 0;
+    while (choice->chosen[i] && strcmp(choice->chosen[i]->name, name) != 0) i++;
+    return choice->chosen[i];
 }
 
 json_t *npg_exporters_json(const npg_export_choice *choice)
 {
     json_t *names = json_array();
     json_array_append_new(names, json_string(choice->is_obj ? "obj" : "ply"));
-    for (int i = 0; npg_exporters[i]; i++)
-        if (choice->is_chosen[i]) json_array_append_new(names, json_string(npg_exporters[i]->name));
+    for (int i = 0; choice->chosen[i]; i++)
+        json_array_append_new(names, json_string(choice->chosen[i]->name));
     return names;
 }
 
@@ -97,10 +94,9 @@ static npg_status check_floats(const npg_exporter *exporter, const npg_export_fa
 
 npg_status npg_exporters_check(const npg_export_choice *choice, const npg_export_facts *facts)
 {
-    for (int i = 0; npg_exporters[i]; i++) {
-        if (!choice->is_chosen[i]) continue;
-        if (npg_exporters[i]->is_float) NPG_TRY(check_floats(npg_exporters[i], facts));
-        if (npg_exporters[i]->check) NPG_TRY(npg_exporters[i]->check(facts));
+    for (int i = 0; choice->chosen[i]; i++) {
+        if (choice->chosen[i]->is_float) NPG_TRY(check_floats(choice->chosen[i], facts));
+        if (choice->chosen[i]->check) NPG_TRY(choice->chosen[i]->check(facts));
     }
     return NPG_OK;
 }
@@ -108,16 +104,8 @@ npg_status npg_exporters_check(const npg_export_choice *choice, const npg_export
 uint64_t npg_exporters_bytes(const npg_export_choice *choice, const npg_export_facts *facts)
 {
     uint64_t sum = 0;
-    for (int i = 0; npg_exporters[i] && facts->pose_count > 0; i++)
-        if (choice->is_chosen[i] && npg_exporters[i]->bytes) sum += npg_exporters[i]->bytes(facts);
+    for (int i = 0; choice->chosen[i] && facts->pose_count > 0; i++) sum += choice->chosen[i]->bytes(facts);
     return sum;
-}
-
-npg_status npg_export_open(npg_file **file, const char *output, const char *name)
-{
-    char path[NPG_PATH_SIZE];
-    NPG_TRY(npg_path_of(path, output, name));
-    return npg_file_open(file, path);
 }
 
 npg_status npg_export_folder(const char *output, const char *name)

@@ -26,8 +26,6 @@
 
 #define NPG_EXPORTERS_MAX 16
 
-typedef struct npg_export_log npg_export_log;
-
 /* What a writer may know before the first pose.  Everything is as written: after axes, scale and centre. */
 typedef struct npg_export_facts {
     const char *output;              /* OUT                                                  */
@@ -52,7 +50,7 @@ typedef struct npg_export_facts {
     double largest, diagonal; /* coordinate, and of the box; 0: not known yet                */
     double longest;           /* side of the box                                             */
     double voxel_share;       /* a level set's voxel, in longest sides                       */
-    npg_export_log *log;      /* where files are noted                                       */
+    npg_file *list;           /* OUT/exports.jsonl, where files are noted                    */
 } npg_export_facts;
 
 typedef struct npg_pose {
@@ -95,16 +93,15 @@ extern const npg_exporter *const npg_exporters[];
 /* ---- what a run was asked for ---- */
 
 typedef struct npg_export_choice {
-    bool is_obj; /* the sequence of the run itself is OBJ, else PLY */
-    bool is_chosen[NPG_EXPORTERS_MAX];
+    bool is_obj;                                   /* the sequence of the run itself is OBJ, else PLY */
+    const npg_exporter *chosen[NPG_EXPORTERS_MAX]; /* in the order of the table; NULL behind them */
 } npg_export_choice;
 
 /* list: "ply,glb,..." or "".  obj beside ply becomes a sequence of its own.  NPG_USAGE names what is no format. */
 npg_status npg_exporters_choose(npg_export_choice *choice, const char *list);
 
-/* Whether the format of this name is made of the meshes, and whether any is. */
+/* Whether the format of this name is made of the meshes. */
 bool npg_exporters_has(const npg_export_choice *choice, const char *name);
-bool npg_exporters_any(const npg_export_choice *choice);
 
 /* Names of all that is made, the sequence first; a new array. */
 json_t *npg_exporters_json(const npg_export_choice *choice);
@@ -126,18 +123,17 @@ typedef struct npg_export_watch {
 /* Remove all that formats of earlier runs left in OUT. */
 npg_status npg_exporters_clear(const char *output);
 
-/* Make them of the meshes that OUT/frames.jsonl lists.  Of facts pose_count, first_index, last_index and log
+/* Make them of the meshes that OUT/frames.jsonl lists.  Of facts pose_count, first_index, last_index and list
  * are filled here.  NPG_DISK, NPG_BAD_INPUT (a mesh that is not the one listed), NPG_USAGE (a format
  * can't hold what is there), NPG_STOPPED. */
 npg_status npg_exporters_write(const npg_export_choice *choice, npg_export_facts *facts,
                                npg_export_watch *watch);
 
 /* A writer's word that OUT/<file> is in place with `pose_count` poses from index first on. */
-npg_status npg_export_made(npg_export_log *log, const char *format, const char *file, int64_t first,
+npg_status npg_export_made(const npg_export_facts *facts, const char *format, const char *file, int64_t first,
                            int64_t pose_count);
 
-/* Begin OUT/<file>; make OUT/<name>, a folder. */
-npg_status npg_export_open(npg_file **file, const char *output, const char *name);
+/* Make OUT/<name>, a folder. */
 npg_status npg_export_folder(const char *output, const char *name);
 
 /* ---- the results' folder and its last file ---- */
@@ -145,6 +141,9 @@ npg_status npg_export_folder(const char *output, const char *name);
 /* NPG_DISK when fewer bytes than these are free where OUT lies, with those of the earlier mesh files in OUT
  * that will be removed. */
 npg_status npg_folder_has_room(const char *output, uint64_t bytes);
+
+/* Whether a run was here before. */
+bool npg_folder_has_run(const char *output);
 
 /* NPG_USAGE when OUT/meshes holds mesh files that this run would not write over: their numbering would mix
  * with the run's; and any where no run was before.  numbers: the frames' numbers, sorted; with none every mesh file is in the way. */

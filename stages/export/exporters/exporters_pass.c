@@ -9,16 +9,10 @@
 #include "ingest/ingest.h"
 #include "pipeline/json_file.h"
 
-struct npg_export_log {
-    const char *output;
-    npg_file *file;
-};
-
 typedef struct exporters_pass {
     const npg_export_choice *choice;
     npg_export_facts *facts;
     npg_export_watch *watch;
-    npg_export_log log;
     void *states[NPG_EXPORTERS_MAX]; /* of the chosen formats, owned; NULL: not open */
     npg_mesh *mesh;                  /* of the pose before, owned */
     int64_t index;                   /* its frame */
@@ -70,22 +64,15 @@ npg_status npg_exporters_clear(const char *output)
 
 /* ---- the list of files ---- */
 
-npg_status npg_export_made(npg_export_log *log, const char *format, const char *file, int64_t first,
+npg_status npg_export_made(const npg_export_facts *facts, const char *format, const char *file, int64_t first,
                            int64_t pose_count)
 {
     json_t *entry = json_pack("{ss ss sI sI}", "form", format, "file", file, "first", (json_int_t)first,
                               "frames", (json_int_t)pose_count);
-    npg_status status = npg_file_facts(entry, log->output, file);
-    if (!status) status = npg_json_print(log->file, entry, JSON_COMPACT);
+    npg_status status = npg_file_facts(entry, facts->output, file);
+    if (!status) status = npg_json_print(facts->list, entry, JSON_COMPACT);
     json_decref(entry);
-    return status ? status : npg_file_write(log->file, "\n", 1);
-}
-
-static npg_status open_log(exporters_pass *p)
-{
-    p->log.output = p->facts->output;
-    p->facts->log = &p->log;
-    return npg_export_open(&p->log.file, p->facts->output, "exports.jsonl");
+    return status ? status : npg_file_write(facts->list, "\n", 1);
 }
 
 /* ---- poses ---- */
@@ -104,7 +91,7 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
 static npg_status write_own_file(exporters_pass *p, int i, npg_pose *pose)
 {
     const npg_export_facts *facts = p->facts;
-    const npg_exporter *exporter = npg_exporters[i];
+    const npg_exporter *exporter = p->choice->chosen[i];
     const npg_mesh_names names = {facts->prefix, exporter->ending, facts->width};
     char name[NPG_MESH_NAME_SIZE], file[NPG_MESH_NAME_SIZE + 16], path[NPG_PATH_SIZE];
     npg_mesh_name(name, &names, pose->number);
@@ -112,7 +99,7 @@ static npg_status write_own_file(exporters_pass *p, int i, npg_pose *pose)
     NPG_TRY(npg_path_of(path, facts->output, file));
     pose->path = path;
     NPG_TRY(exporter->pose(p->states[i], pose));
-    return npg_export_made(facts->log, exporter->name, file, pose->index, 1);
+    return npg_export_made(facts, exporter->name, file, pose->index, 1);
 }
 
 static npg_status pass_pose(exporters_pass *p, int64_t index, int64_t number, bool fixed_rate_only)
@@ -123,10 +110,10 @@ static npg_status pass_pose(exporters_pass *p, int64_t index, int64_t number, bo
                      p->mesh->vert_normals,
                      p->facts->has_pose_colours ? p->mesh->vert_colours : NULL,
                      NULL};
-    for (int i = 0; npg_exporters[i]; i++)
-        if (p->states[i] && (!fixed_rate_only || npg_exporters[i]->has_fixed_rate))
-            NPG_TRY(npg_exporters[i]->folder ? write_own_file(p, i, &pose)
-                                             : npg_exporters[i]->pose(p->states[i], &pose));
+    for (int i = 0; p->choice->chosen[i]; i++)
+        if (!fixed_rate_only || p->choice->chosen[i]->has_fixed_rate)
+            NPG_TRY(p->choice->chosen[i]->folder ? write_own_file(p, i, &pose)
+                                                 : p->choice->chosen[i]->pose(p->states[i], &pose));
     return NPG_OK;
 }
 
@@ -150,9 +137,9 @@ static npg_status read_pose(exporters_pass *p, const char *file)
 
 static bool any_fixed_rate(const npg_export_choice *choice)
 {
-    for (int i = 0; npg_exporters[i]; i++)
-        if (choice->is_chosen[i] && npg_exporters[i]->has_fixed_rate) return true;
-    return false;
+    int i = 0;
+    while (choice->chosen[i] && !choice->chosen[i]->has_fixed_rate) i++;
+    return choice->chosen[i];
 }
 
 static npg_status write_line_poses(void *user, const json_t *frame, const char *line, size_t size)
@@ -177,15 +164,15 @@ static npg_status write_line_poses(void *user, const json_t *frame, const char *
 
 static npg_status open_writers(exporters_pass *p)
 {
-    for (int i = 0; npg_exporters[i]; i++) {
-        if (!p->choice->is_chosen[i]) continue;
-        NPG_TRY(npg_alloc(&p->states[i], NPG_FOR_FILES, npg_exporters[i]->state_size));
+    for (int i = 0; p->choice->chosen[i]; i++) {
+        NPG_TRY(npg_alloc(&p->states[i], NPG_FOR_FILES, p->choice->chosen[i]->state_size));
         npg_writer *writer = p->states[i];
         writer->facts = p->facts;
-        if (npg_exporters[i]->file)
-            NPG_TRY(npg_export_open(&writer->file, p->facts->output, npg_exporters[i]->file));
-        if (npg_exporters[i]->folder) NPG_TRY(npg_export_folder(p->facts->output, npg_exporters[i]->folder));
-        if (npg_exporters[i]->open) NPG_TRY(npg_exporters[i]->open(writer));
+        if (p->choice->chosen[i]->file)
+            NPG_TRY(npg_file_open_in(&writer->file, p->facts->output, p->choice->chosen[i]->file));
+        if (p->choice->chosen[i]->folder)
+            NPG_TRY(npg_export_folder(p->facts->output, p->choice->chosen[i]->folder));
+        if (p->choice->chosen[i]->open) NPG_TRY(p->choice->chosen[i]->open(writer));
     }
     return NPG_OK;
 }
@@ -198,7 +185,7 @@ static npg_status write_reference(const npg_export_facts *facts)
     npg_status status = NPG_OK;
     if (!npg_is_there(path)) { /* the other point cache may have made it in this pass */
         status = npg_write_obj_pose(path, facts, facts->rest, NULL, NULL);
-        if (!status) status = npg_export_made(facts->log, "obj", "reference.obj", facts->first_index, 1);
+        if (!status) status = npg_export_made(facts, "obj", "reference.obj", facts->first_index, 1);
     }
     return status;
 }
@@ -209,29 +196,28 @@ static npg_status end_file(const exporters_pass *p, const npg_exporter *exporter
     const npg_export_facts *facts = p->facts;
     int64_t frames = facts->last_index - facts->first_index + 1;
     NPG_TRY(npg_file_commit(&writer->file));
-    return npg_export_made(facts->log, exporter->name, exporter->file, facts->first_index,
+    return npg_export_made(facts, exporter->name, exporter->file, facts->first_index,
                            exporter->has_fixed_rate ? frames : facts->pose_count);
 }
 
 static npg_status finish_writers(exporters_pass *p)
 {
-    for (int i = 0; npg_exporters[i]; i++) {
-        if (!p->states[i]) continue;
-        if (npg_exporters[i]->finish) NPG_TRY(npg_exporters[i]->finish(p->states[i]));
-        if (npg_exporters[i]->file) NPG_TRY(end_file(p, npg_exporters[i], p->states[i]));
-        if (npg_exporters[i]->with_reference) NPG_TRY(write_reference(p->facts));
+    for (int i = 0; p->choice->chosen[i]; i++) {
+        if (p->choice->chosen[i]->finish) NPG_TRY(p->choice->chosen[i]->finish(p->states[i]));
+        if (p->choice->chosen[i]->file) NPG_TRY(end_file(p, p->choice->chosen[i], p->states[i]));
+        if (p->choice->chosen[i]->with_reference) NPG_TRY(write_reference(p->facts));
     }
-    return npg_file_commit(&p->log.file);
+    return npg_file_commit(&p->facts->list);
 }
 
 static void close_pass(exporters_pass *p)
 {
-    for (int i = 0; npg_exporters[i]; i++) {
-        if (p->states[i] && npg_exporters[i]->close) npg_exporters[i]->close(p->states[i]);
+    for (int i = 0; p->choice->chosen[i]; i++) {
+        if (p->states[i] && p->choice->chosen[i]->close) p->choice->chosen[i]->close(p->states[i]);
         if (p->states[i]) npg_file_discard(&((npg_writer *)p->states[i])->file);
         npg_release(&p->states[i]);
     }
-    npg_file_discard(&p->log.file);
+    npg_file_discard(&p->facts->list);
     npg_mesh_unref(&p->mesh);
 }
 
@@ -244,7 +230,7 @@ static npg_status write_exports(exporters_pass *p)
     NPG_TRY(npg_json_lines(facts->output, "frames.jsonl", -1, count_line, facts));
     if (!facts->pose_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", facts->output);
     NPG_TRY(npg_exporters_check(p->choice, facts));
-    NPG_TRY(open_log(p));
+    NPG_TRY(npg_file_open_in(&facts->list, facts->output, "exports.jsonl"));
     NPG_TRY(open_writers(p));
     NPG_TRY(npg_json_lines(facts->output, "frames.jsonl", -1, write_line_poses, p));
     return finish_writers(p);

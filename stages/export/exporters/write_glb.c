@@ -416,7 +416,7 @@ static npg_status begin_file(glb_state *s, const npg_pose *pose)
         strcpy(s->name, "motion.glb");
     else
         snprintf(s->name, sizeof s->name, "motion_%03lld.glb", (long long)s->layout.segment);
-    NPG_TRY(npg_export_open(&s->writer.file, facts->output, s->name));
+    NPG_TRY(npg_file_open_in(&s->writer.file, facts->output, s->name));
     s->text_length = 0;
     NPG_TRY(make_text(&text, &s->text_length, &s->layout));
     put_heads(s, heads);
@@ -441,7 +441,7 @@ static npg_status end_file(glb_state *s)
     NPG_TRY(status);
     NPG_TRY(npg_file_commit(&s->writer.file));
     s->at = 0;
-    return npg_export_made(s->writer.facts->log, "glb", s->name, s->layout.first_index,
+    return npg_export_made(s->writer.facts, "glb", s->name, s->layout.first_index,
                            (int64_t)s->layout.pose_count);
 }
 

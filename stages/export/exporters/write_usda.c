@@ -59,16 +59,15 @@ static void print_tuples(npg_file *file, const float *values, size_t rows, int w
 
 static void print_stage(npg_file *file, const npg_export_facts *facts)
 {
-    npg_file_print(file, "#usda 1.0\n(\n    defaultPrim = \"capture\"\n    endTimeCode = %lld\n",
-                   (long long)facts->last_index);
-    npg_file_print(file, "    framesPerSecond = ");
-    print_number(file, facts->fps);
-    npg_file_print(file, "\n    metersPerUnit = ");
-    print_number(file, facts->metres_per_unit);
-    npg_file_print(file,
-                   "\n    startTimeCode = %lld\n    timeCodesPerSecond = ", (long long)facts->first_index);
-    print_number(file, facts->fps);
-    npg_file_print(file, "\n    upAxis = \"%s\"\n)\n\n", facts->is_z_up ? "Z" : "Y");
+    char fps[40], metres[40];
+    npg_number_print(fps, sizeof fps, "%.9g", facts->fps);
+    npg_number_print(metres, sizeof metres, "%.9g", facts->metres_per_unit);
+    npg_file_print(
+        file,
+        "#usda 1.0\n(\n    defaultPrim = \"capture\"\n    endTimeCode = %lld\n    framesPerSecond = %s\n"
+        "    metersPerUnit = %s\n    startTimeCode = %lld\n    timeCodesPerSecond = %s\n    upAxis = \"%s\"\n)\n\n",
+        (long long)facts->last_index, fps, metres, (long long)facts->first_index, fps,
+        facts->is_z_up ? "Z" : "Y");
 }
 
 static void print_faces(npg_file *file, const npg_export_facts *facts)

@@ -143,11 +143,11 @@ static void draw_zero(float *values, size_t at, size_t end, npg_random *random)
 /* Weights and biases in the order of their list; the head is zero, so that all begins as the identity. */
 static void draw_layers(float *to, const npg_mlp_shape *s, size_t inputs, npg_random *random)
 {
-    draw_uniform(to, 0, npg_mlp_at_head(s), s->w1, random);
-    draw_zero(to, npg_mlp_at_head(s), npg_mlp_at_b2(s), random);
-    draw_uniform(to, npg_mlp_at_b2(s), npg_mlp_at_head_bias(s), s->w1, random);
-    draw_zero(to, npg_mlp_at_head_bias(s), npg_mlp_at_w1z(s), random);
-    draw_uniform(to, npg_mlp_at_w1z(s), npg_mlp_param_count(s), inputs, random);
+    draw_uniform(to, 0, npg_mlp_places_of(s).head, s->w1, random);
+    draw_zero(to, npg_mlp_places_of(s).head, npg_mlp_places_of(s).b2, random);
+    draw_uniform(to, npg_mlp_places_of(s).b2, npg_mlp_places_of(s).head_bias, s->w1, random);
+    draw_zero(to, npg_mlp_places_of(s).head_bias, npg_mlp_places_of(s).w1z, random);
+    draw_uniform(to, npg_mlp_places_of(s).w1z, npg_mlp_places_of(s).end, inputs, random);
 }
 
 static npg_status draw_params(npg_fit *fit)
@@ -155,7 +155,7 @@ static npg_status draw_params(npg_fit *fit)
     const npg_grid_settings *settings = &fit->settings.grid;
     npg_mlp_shape s = shape_of(settings);
     npg_random random = npg_random_stream(fit->seed, 0, 0);
-    size_t count = npg_mlp_param_count(&s);
+    size_t count = npg_mlp_places_of(&s).end;
     size_t inputs = (size_t)(settings->position_channels + settings->normal_channels) + s.code_size;
     float rate = (float)settings->mlp_rate;
     fit->params = npg_arena_take(&fit->arrays, count, sizeof *fit->params);
@@ -317,7 +317,8 @@ npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count
     sort_outward(fit, frames, count, key);
     NPG_TRY(npg_mlp_open(&fit->mlp, fit->device, &shape, fit->rows, count,
                          measure || count < BATCH ? count : BATCH));
-    NPG_TRY(npg_buffer_write(&fit->mlp.params, 0, fit->params, npg_mlp_param_count(&shape) * sizeof(float)));
+    NPG_TRY(
+        npg_buffer_write(&fit->mlp.params, 0, fit->params, npg_mlp_places_of(&shape).end * sizeof(float)));
     return measure ? open_motion_on(fit, NULL) : open_targets(fit, frames);
 }
 
@@ -548,7 +549,7 @@ npg_fit_parts npg_fit_open_parts(npg_fit *fit)
 {
     npg_mlp_shape shape = shape_of(&fit->settings.grid);
     return (npg_fit_parts){&fit->levels,   &fit->u,     &fit->grid_adam,
-                           &fit->mlp_adam, fit->params, npg_mlp_param_count(&shape),
+                           &fit->mlp_adam, fit->params, npg_mlp_places_of(&shape).end,
                            &fit->first};
 }
 
@@ -565,7 +566,7 @@ size_t npg_fit_memory(const npg_fit_settings *s, size_t vert_count, size_t frame
     size_t batch = frames < BATCH || s->is_of_ways ? frames : BATCH;
     size_t per_row = 2 * shape.w1 + batch * shape.w2 + 2 * 8 * 8 * (size_t)levels.count / 4 + 96;
     size_t per_frame = rows * (2 * NPG_MLP_OUT + 6 + 4 + 9) + points * 8 + groups * shape.w1;
-    size_t per_group = npg_mlp_param_count(&shape) + npg_mlp_scratch(&shape, block);
-    size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 8, decoder = npg_mlp_param_count(&shape) * 7;
+    size_t per_group = npg_mlp_places_of(&shape).end + npg_mlp_scratch(&shape, block);
+    size_t grids = levels.row_count * NPG_LATENT_CHANNELS * 8, decoder = npg_mlp_places_of(&shape).end * 7;
     return 4 * (rows * per_row + frames * per_frame + groups * per_group + grids + decoder);
 }

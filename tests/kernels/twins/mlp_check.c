@@ -24,7 +24,7 @@ static npg_status make_mlp_data(npg_check *c, mlp_data *d, int size)
     d->shape = (npg_mlp_shape){32 * (size_t)size, size > 1 ? 64 : 32, size == 2 ? 2 : 8};
     d->rows = npg_mlp_rows(c->device, 1) * (size > 2 ? 3 : 1);
     d->frames = size == 1 ? 2 : 5;
-    size_t n = d->param_count = npg_mlp_param_count(&d->shape), samples = d->rows * d->frames;
+    size_t n = d->param_count = npg_mlp_places_of(&d->shape).end, samples = d->rows * d->frames;
     d->params = npg_check_values(c, &d->params_wide, n, 1 / sqrt((double)d->shape.w1));
     d->z = npg_check_values(c, &d->z_wide, d->rows * CHANNELS, 1);
     d->code = npg_check_values(c, &d->code_wide, d->frames * d->shape.code_size, 1);
@@ -35,9 +35,9 @@ static npg_status make_mlp_data(npg_check *c, mlp_data *d, int size)
     NPG_TRY(npg_arena_status(&c->arena));
     for (size_t k = 0; k < d->shape.w2; k++)
         for (size_t o = NPG_MLP_USED; o < NPG_MLP_HEAD_ROW; o++)
-            d->params[npg_mlp_at_head(&d->shape) + k * NPG_MLP_HEAD_ROW + o] = 0;
+            d->params[npg_mlp_places_of(&d->shape).head + k * NPG_MLP_HEAD_ROW + o] = 0;
     for (size_t o = NPG_MLP_USED; o < NPG_MLP_HEAD_ROW; o++)
-        d->params[npg_mlp_at_head_bias(&d->shape) + o] = 0;
+        d->params[npg_mlp_places_of(&d->shape).head_bias + o] = 0;
     for (size_t i = 7; i < samples * NPG_MLP_OUT; i += NPG_MLP_OUT) d->dout[i] = 0;
     return NPG_OK;
 }

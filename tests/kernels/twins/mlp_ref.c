@@ -22,8 +22,8 @@ static double leaky_back(double d, double y)
 static void first_layer(double *h, const double *z, const double *code, const double *params,
                         const npg_mlp_shape *s)
 {
-    const double *w1z = params + npg_mlp_at_w1z(s), *w1t = params + npg_mlp_at_w1t(s),
-                 *b1 = params + npg_mlp_at_b1(s);
+    const double *w1z = params + npg_mlp_places_of(s).w1z, *w1t = params + npg_mlp_places_of(s).w1t,
+                 *b1 = params + npg_mlp_places_of(s).b1;
     for (size_t n = 0; n < s->w1; n++) {
         double sum = b1[n];
         for (size_t c = 0; c < CHANNELS; c++) sum += z[c] * w1z[npg_mlp_packed(CHANNELS, c, n)];
@@ -35,7 +35,7 @@ static void first_layer(double *h, const double *z, const double *code, const do
 static void hidden(layers *to, const double *z, const double *code, const double *params,
                    const npg_mlp_shape *s)
 {
-    const double *b2 = params + npg_mlp_at_b2(s);
+    const double *b2 = params + npg_mlp_places_of(s).b2;
     first_layer(to->h1, z, code, params, s);
     for (size_t n = 0; n < s->w2; n++) {
         double sum = b2[n];
@@ -48,7 +48,7 @@ void npg_mlp_forward_ref(double *out, const double *z, const double *code, const
                          const npg_mlp_shape *s)
 {
     layers in;
-    const double *head = params + npg_mlp_at_head(s), *bias = params + npg_mlp_at_head_bias(s);
+    const double *head = params + npg_mlp_places_of(s).head, *bias = params + npg_mlp_places_of(s).head_bias;
     hidden(&in, z, code, params, s);
     for (size_t o = 0; o < NPG_MLP_USED; o++) {
         out[o] = bias[o];
@@ -60,7 +60,7 @@ void npg_mlp_forward_ref(double *out, const double *z, const double *code, const
 static void head_back(double *d2, double *grad, const double *dout, const double *h2, const double *params,
                       const npg_mlp_shape *s)
 {
-    size_t at = npg_mlp_at_head(s);
+    size_t at = npg_mlp_places_of(s).head;
     for (size_t k = 0; k < s->w2; k++) {
         double sum = 0;
         for (size_t o = 0; o < NPG_MLP_USED; o++) {
@@ -69,7 +69,7 @@ static void head_back(double *d2, double *grad, const double *dout, const double
         }
         d2[k] = leaky_back(sum, h2[k]);
     }
-    for (size_t o = 0; o < NPG_MLP_USED; o++) grad[npg_mlp_at_head_bias(s) + o] += dout[o];
+    for (size_t o = 0; o < NPG_MLP_USED; o++) grad[npg_mlp_places_of(s).head_bias + o] += dout[o];
 }
 
 /* d1: gradient before the rectifier of the first layer; grad of the second. */
@@ -84,13 +84,13 @@ static void second_back(double *d1, double *grad, const double *d2, const double
         }
         d1[k] = leaky_back(sum, h1[k]);
     }
-    for (size_t n = 0; n < s->w2; n++) grad[npg_mlp_at_b2(s) + n] += d2[n];
+    for (size_t n = 0; n < s->w2; n++) grad[npg_mlp_places_of(s).b2 + n] += d2[n];
 }
 
 static void first_back(double *grad, double *dz, const double *d1, const double *z, const double *code,
                        const double *params, const npg_mlp_shape *s)
 {
-    size_t at_z = npg_mlp_at_w1z(s), at_t = npg_mlp_at_w1t(s);
+    size_t at_z = npg_mlp_places_of(s).w1z, at_t = npg_mlp_places_of(s).w1t;
     for (size_t n = 0; n < s->w1; n++) {
         for (size_t c = 0; c < CHANNELS; c++) {
             size_t at = at_z + npg_mlp_packed(CHANNELS, c, n);
@@ -100,7 +100,7 @@ static void first_back(double *grad, double *dz, const double *d1, const double 
         for (size_t j = 0; j < s->code_size; j++) {
             grad[at_t + j * s->w1 + n] += d1[n] * code[j];
         }
-        grad[npg_mlp_at_b1(s) + n] += d1[n];
+        grad[npg_mlp_places_of(s).b1 + n] += d1[n];
     }
 }
 
