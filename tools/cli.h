@@ -58,12 +58,6 @@ void npg_help_verbs(FILE *out);
 void npg_help_method(void);
 void npg_help_method_json(void);
 
-/* "--name VALUE" as the help shows it; size includes the closing zero. */
-void npg_help_spell(char *out, size_t size, const npg_option_info *option);
-
-/* What an option takes: default, range and words, in one line; "" when there are none. */
-void npg_help_limits(char *out, size_t size, const npg_option_info *option);
-
 /* What report.json ("report") or done.json ("done") of a run has in it, or its JSON schema (tools/schemas/); false for
  * another name. */
 bool npg_help_file(const char *name, bool as_json);

@@ -1,4 +1,4 @@
-/* Help: the options of a verb, the keys of the method, and both as JSON, from the tables. */
+/* Help: the options of a verb, the keys of the method, both as JSON, and the manual page, from the tables. */
 #include "tools/cli.h"
 
 #include <jansson.h>
@@ -15,7 +15,8 @@ static const char *short_name(const char *name)
     return dot ? dot + 1 : name;
 }
 
-void npg_help_spell(char *out, size_t size, const npg_option_info *option)
+/* "--name VALUE". */
+static void spell(char *out, size_t size, const npg_option_info *option)
 {
     static const char *const by_type[] = {"", "N", "X", "WORD", "TEXT"};
     const char *value = option->value_name ? option->value_name : by_type[option->type];
@@ -28,7 +29,8 @@ void npg_help_spell(char *out, size_t size, const npg_option_info *option)
         snprintf(out, size, "--%s %s", option->name, value);
 }
 
-void npg_help_limits(char *out, size_t size, const npg_option_info *option)
+/* What an option takes: default, range and words, in one line; "" when there are none. */
+static void limit_words(char *out, size_t size, const npg_option_info *option)
 {
     const char *given = option->default_text;
     out[0] = 0;
@@ -70,8 +72,8 @@ static void print_option(const npg_option_info *option, bool is_short)
 {
     char spelled[SPELL_LIMIT], limits[LIMITS_LIMIT], bracketed[LIMITS_LIMIT + 4];
     const char *end = is_short ? strstr(option->help, ". ") : NULL;
-    npg_help_spell(spelled, sizeof spelled, option);
-    npg_help_limits(limits, sizeof limits, option);
+    spell(spelled, sizeof spelled, option);
+    limit_words(limits, sizeof limits, option);
     int column = printf("  %s%s", option->use == NPG_USE_PART ? "  " : "", spelled);
     if (column + 1 > HELP_INDENT) {
         putchar('\n');
@@ -90,12 +92,17 @@ static void print_option(const npg_option_info *option, bool is_short)
 
 /* ---- a verb ---- */
 
-static void print_parts(const char *list)
+/* Keys of the method, or the parts of a list. */
+static void each_row(npg_option_use use, const npg_option_list *list, void (*print)(const npg_option_info *))
 {
-    npg_option_info part = {.struct_size = sizeof part};
-    for (size_t i = 0; npg_options_describe(i, &part) == NPG_OK; i++)
-        if (part.use == NPG_USE_PART && !strcmp(npg_option_list_of(part.name)->name, list))
-            print_option(&part, false);
+    npg_option_info info = {.struct_size = sizeof info};
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
+        if (info.use == use && npg_option_list_of(info.name) == list) print(&info);
+}
+
+static void print_row(const npg_option_info *option)
+{
+    print_option(option, false);
 }
 
 static void print_options(const npg_verb *verb, bool all)
@@ -109,7 +116,8 @@ static void print_options(const npg_verb *verb, bool all)
             printf("\n%s%s:\n", is_run ? "" : "Options of neupig ", info.stage);
         group = info.stage;
         print_option(&info, is_run && !all);
-        if (all && is_run && npg_option_list_of(info.name)) print_parts(info.name);
+        const npg_option_list *list = npg_option_list_of(info.name);
+        if (all && is_run && list) each_row(NPG_USE_PART, list, print_row);
     }
 }
 
@@ -146,15 +154,13 @@ void npg_help_verbs(FILE *out)
 
 void npg_help_method(void)
 {
-    npg_option_info info = {.struct_size = sizeof info};
     fputs("--method NAME, --method FILE.json, or --method '{\"preset\": \"NAME\", \"KEY\": VALUE, ...}'; "
           "several add up.\n\nNames:\n",
           stdout);
     for (const npg_preset *preset = npg_presets; preset->name; preset++)
         printf("  %-26s%s\n", preset->name, preset->help);
     fputs("\nKeys, beside all options of neupig run:\n", stdout);
-    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
-        if (info.use == NPG_USE_METHOD) print_option(&info, false);
+    each_row(NPG_USE_METHOD, NULL, print_row);
 }
 
 /* ---- as JSON ---- */
@@ -192,7 +198,7 @@ void npg_help_verb_json(const npg_verb *verb)
     char spelled[SPELL_LIMIT];
     json_t *options = json_array();
     for (size_t i = 0; npg_cli_option(&info, NULL, verb, i) == NPG_OK; i++) {
-        npg_help_spell(spelled, sizeof spelled, &info);
+        spell(spelled, sizeof spelled, &info);
         json_t *option = schema_of(&info);
         json_object_set_new(option, "name", json_string(info.name));
         json_object_set_new(option, "option", json_string(spelled));
@@ -249,4 +255,101 @@ bool npg_help_file(const char *name, bool as_json)
     print_keys(schema, "");
     json_decref(schema);
     return true;
+}
+
+/* ---- the manual page ---- */
+
+/* Text as roff shows it letter by letter. */
+static void put_text(const char *text)
+{
+    for (const char *c = text; *c; c++) {
+        if (c == text && (*c == '.' || *c == '\'')) fputs("\\&", stdout);
+        if (*c == '\\')
+            fputs("\\e", stdout);
+        else if (*c == '-')
+            fputs("\\-", stdout);
+        else
+            putchar(*c);
+    }
+}
+
+static void put_option(const npg_option_info *option)
+{
+    char spelled[SPELL_LIMIT], limits[LIMITS_LIMIT];
+    spell(spelled, sizeof spelled, option);
+    limit_words(limits, sizeof limits, option);
+    fputs(".TP\n.B ", stdout);
+    put_text(spelled);
+    putchar('\n');
+    put_text(option->help);
+    if (limits[0]) {
+        fputs(" (", stdout);
+        put_text(limits);
+        putchar(')');
+    }
+    putchar('\n');
+}
+
+static void put_verb(const npg_verb *verb)
+{
+    npg_option_info info;
+    const char *stage = "";
+    printf(".SS neupig %s", verb->name);
+    putchar(' ');
+    put_text(verb->operands);
+    putchar('\n');
+    put_text(verb->text);
+    putchar('\n');
+    for (size_t i = 0; npg_cli_option(&info, NULL, verb, i) == NPG_OK; i++) {
+        if (strcmp(stage, info.stage) != 0)
+            printf(".PP\n%s%s:\n", verb->with_run_options ? "" : "Options of ", info.stage);
+        stage = info.stage;
+        put_option(&info);
+        const npg_option_list *list = npg_option_list_of(info.name);
+        if (!list) continue;
+        fputs(".RS\n", stdout);
+        each_row(NPG_USE_PART, list, put_option);
+        fputs(".RE\n", stdout);
+    }
+}
+
+static void put_methods(void)
+{
+    fputs(".SH METHODS\nNames and keys of the option method.\n", stdout);
+    for (const npg_preset *preset = npg_presets; preset->name; preset++) {
+        printf(".TP\n.B %s\n", preset->name);
+        put_text(preset->help);
+        putchar('\n');
+    }
+    each_row(NPG_USE_METHOD, NULL, put_option);
+}
+
+npg_status npg_verb_man(const npg_cli *cli)
+{
+    (void)cli;
+    static const char *const codes[][2] = {
+        {"0", "done"},
+        {"1", "failed"},
+        {"2", "usage or configuration"},
+        {"3", "bad input; the message names file, place and cause"},
+        {"4", "device: no OpenCL device, or one that computes wrong"},
+        {"5", "disk: writing failed"},
+        {"6", "memory"},
+        {"7", "finished with frames skipped or below the quality bar"},
+        {"75", "stopped by a signal"},
+    };
+    printf(".TH NEUPIG 1 \"\" \"neupig %s\" \"User Commands\"\n", npg_version());
+    fputs(".SH NAME\nneupig \\- one moving mesh from a long sequence of point clouds\n"
+          ".SH SYNOPSIS\n.B neupig\n.I VERB\n[options] [operands]\n"
+          ".SH DESCRIPTION\nTurns a sequence of point clouds into one mesh that moves through all of them, "
+          "every vertex keeping its identity.\n"
+          "Options are written \\-\\-name VALUE or \\-\\-name=VALUE; flags \\-\\-name or \\-\\-no\\-name.\n"
+          ".SH VERBS\n",
+          stdout);
+    for (const npg_verb *verb = npg_verbs; verb->name; verb++) put_verb(verb);
+    put_methods();
+    fputs(".SH EXIT STATUS\n", stdout);
+    for (size_t i = 0; i < sizeof codes / sizeof *codes; i++)
+        printf(".TP\n.B %s\n%s\n", codes[i][0], codes[i][1]);
+    return NPG_OK;
 }

@@ -33,10 +33,7 @@ npg_status npg_reporter_open_log(npg_reporter *reporter, const char *path, const
 {
     if (!path[0]) return NPG_OK;
     reporter->log_fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-    if (reporter->log_fd < 0) {
-        npg_error_errno(NPG_DISK, "can't write %s", path);
-        return NPG_DISK;
-    }
+    if (reporter->log_fd < 0) return npg_error_errno(NPG_DISK, "can't write %s", path);
     npg_log_file_write(&reporter->log_fd,
                        json_pack("{s:s,s:s,s:o,s:I}", "event", "start", "neupig", npg_version(), "output",
                                  npg_json_text(output), "pid", (json_int_t)getpid()));
@@ -216,11 +213,10 @@ void npg_reporter_log(npg_reporter *reporter, npg_log_level level, double time_s
                       const char *format, ...)
 {
     char text[900];
-    npg_hooks hooks = npg_reporter_hooks(reporter);
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     npg_log_record record = {sizeof record, level, time_s, stage, -1, text};
-    hooks.log(hooks.user, &record);
+    show_record(reporter, &record);
 }

@@ -37,25 +37,6 @@ const npg_option npg_batch_options[] = {
     {0}};
 /* clang-format on */
 
-static void print_names(const npg_batch *batch)
-{
-    for (size_t i = 0; i < batch->count; i++)
-        if (npg_batch_is_mine(batch, i)) puts(batch->captures[i].name);
-}
-
-static npg_status status_of(const npg_batch *batch, int exit_code)
-{
-    size_t mine = 0, bad = 0;
-    for (size_t i = 0; i < batch->count; i++) {
-        mine += npg_batch_is_mine(batch, i);
-        bad += npg_batch_is_mine(batch, i) && !npg_verdict_is_done(&batch->captures[i].verdict);
-    }
-    if (exit_code == 1)
-        return npg_error(NPG_FAILED, "%zu of %zu captures are not done; see %s/batch.json", bad, mine,
-                         batch->output);
-    return exit_code == 7 ? NPG_PARTIAL : exit_code == 75 ? NPG_STOPPED : NPG_OK;
-}
-
 static npg_status run(npg_batch *batch, const settings *s)
 {
     npg_reporter reporter;
@@ -64,7 +45,7 @@ static npg_status run(npg_batch *batch, const settings *s)
     npg_status status = npg_batch_run(batch, &reporter, (size_t)s->jobs, &stopped);
     npg_reporter_pause(&reporter);
     if (!status) status = npg_batch_report(batch, reporter.show == NPG_SHOW_JSON ? NULL : stdout);
-    if (!status) status = status_of(batch, npg_batch_exit_code(batch, false, stopped));
+    if (!status) status = npg_batch_status(batch, false, stopped);
     npg_reporter_end(&reporter, status, batch->output);
     if (status == NPG_STOPPED) fputs("neupig batch: stopped on request; run again to resume\n", stderr);
     if (status == NPG_PARTIAL)
@@ -78,37 +59,27 @@ static npg_status run(npg_batch *batch, const settings *s)
 /* Whatever process has run the captures. */
 static npg_status report(npg_batch *batch, const settings *s)
 {
-    batch->task_index = 0;
-    batch->task_count = 1;
     for (size_t i = 0; i < batch->count; i++)
         npg_verdict_read(&batch->captures[i].verdict, &batch->captures[i]);
     NPG_TRY(npg_batch_report(batch, s->shown.quiet ? NULL : stdout));
-    return status_of(batch, npg_batch_exit_code(batch, true, false));
-}
-
-static npg_status open_batch(npg_batch **batch, const npg_cli *cli)
-{
-    const settings *s = cli->values;
-    const npg_batch_given given = {cli->options, s->max_time_s < 0 ? -1 : s->max_time_s, s->segments};
-    if (s->task_index >= s->task_count)
-        return npg_error(NPG_USAGE,
-                         "option task-index: %lld is not below the task-count of %lld; the first task is 0",
-                         (long long)s->task_index, (long long)s->task_count);
-    NPG_TRY(npg_batch_open(batch, cli->operands[0], &given));
-    (*batch)->task_index = (size_t)s->task_index;
-    (*batch)->task_count = (size_t)s->task_count;
-    return NPG_OK;
+    return npg_batch_status(batch, true, false);
 }
 
 npg_status npg_verb_batch(const npg_cli *cli)
 {
     const settings *s = cli->values;
+    const npg_batch_given given = {cli->options, s->max_time_s < 0 ? -1 : s->max_time_s, s->segments};
     npg_batch *batch = NULL;
-    npg_status status = open_batch(&batch, cli);
-    if (!status && s->list)
-        print_names(batch);
-    else if (!status)
-        status = s->report ? report(batch, s) : run(batch, s);
+    if (s->task_index >= s->task_count)
+        return npg_error(NPG_USAGE,
+                         "option task-index: %lld is not below the task-count of %lld; the first task is 0",
+                         (long long)s->task_index, (long long)s->task_count);
+    NPG_TRY(npg_batch_open(&batch, cli->operands[0], &given));
+    batch->task_index = (size_t)s->task_index;
+    batch->task_count = (size_t)s->task_count;
+    npg_status status = s->list ? NPG_OK : s->report ? report(batch, s) : run(batch, s);
+    for (size_t i = 0; s->list && i < batch->count; i++)
+        if (npg_batch_is_mine(batch, i)) puts(batch->captures[i].name);
     npg_batch_close(&batch);
     return status;
 }

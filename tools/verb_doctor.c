@@ -92,13 +92,15 @@ static void print_text(const json_t *machine, const json_t *libraries, json_t *d
     json_object_foreach((json_t *)(uintptr_t)libraries, name, value)
         printf("library: %-14s %s\n", name, json_string_value(value));
     json_array_foreach(devices, i, value)
+    {
+        const char *platform, *version, *self_test;
+        int units;
+        json_int_t bytes;
+        json_unpack(value, "{s:s,s:s,s:s,s:i,s:I,s:s}", "name", &name, "platform", &platform, "version",
+                    &version, "compute_units", &units, "memory_bytes", &bytes, "self_test", &self_test);
         printf("device %zu: %s\n          %s, %s, %d compute units, %.1f GiB\n          self-test: %s\n", i,
-               json_string_value(json_object_get(value, "name")),
-               json_string_value(json_object_get(value, "version")),
-               json_string_value(json_object_get(value, "platform")),
-               (int)json_integer_value(json_object_get(value, "compute_units")),
-               (double)json_integer_value(json_object_get(value, "memory_bytes")) / 0x1p30,
-               json_string_value(json_object_get(value, "self_test")));
+               name, version, platform, units, (double)bytes / 0x1p30, self_test);
+    }
 }
 
 static npg_status status_of(const json_t *devices)

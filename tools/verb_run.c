@@ -1,5 +1,4 @@
 /* neupig run: the main job. */
-#include <errno.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stddef.h>
@@ -58,26 +57,16 @@ void npg_signals_block(sigset_t *all, sigset_t *before, int more)
     pthread_sigmask(SIG_BLOCK, all, before);
 }
 
-/* The next signal, or -1 when none came in time. */
-static int next_signal(const watcher *w, const struct timespec *limit)
-{
-    int number;
-    do number = limit ? sigtimedwait(&w->all, NULL, limit) : sigwaitinfo(&w->all, NULL);
-    while (number < 0 && errno == EINTR);
-    return number;
-}
-
-/* The second request: one that comes right after the first is the same one on another way. */
+/* The second request, or -1 where none comes in time: one that comes right after the first is the same one on another
+ * way. */
 static int wait_for_second(const watcher *w)
 {
-    double begin_s = npg_clock_s();
-    for (;;) {
-        double left_s = begin_s + STOP_SECONDS - npg_clock_s();
-        if (left_s < 0) left_s = 0;
-        const struct timespec limit = {(time_t)left_s, (long)(1e9 * (left_s - (double)(time_t)left_s))};
-        int number = next_signal(w, &limit);
-        if (number < 0 || number == SIGUSR1 || npg_clock_s() > begin_s + AGAIN_SECONDS) return number;
+    const struct timespec tick = {.tv_nsec = 100000000};
+    for (double begin_s = npg_clock_s(); npg_clock_s() < begin_s + STOP_SECONDS;) {
+        int number = sigtimedwait(&w->all, NULL, &tick);
+        if (number == SIGUSR1 || (number > 0 && npg_clock_s() > begin_s + AGAIN_SECONDS)) return number;
     }
+    return -1;
 }
 
 /* The first signal stops the run in good order; the second ends the process the usual way.
@@ -87,9 +76,12 @@ static void *watch_signals(void *argument)
 {
     static const char text[] = "neupig: stopped on request; run again to resume\n";
     const watcher *w = argument;
-    if (next_signal(w, NULL) == SIGUSR1) return NULL;
+    int number;
+    do number = sigwaitinfo(&w->all, NULL);
+    while (number < 0);
+    if (number == SIGUSR1) return NULL;
     npg_run_stop(w->run);
-    int number = wait_for_second(w);
+    number = wait_for_second(w);
     if (number == SIGUSR1) return NULL;
     if (number < 0) {
         ssize_t written = write(STDERR_FILENO, text, sizeof text - 1);
@@ -119,15 +111,6 @@ static void end_watching(watcher *w)
 
 /* ---- the verb ---- */
 
-/* The last line: how good it is, and how to look at it. */
-static void print_verdict(const char *output)
-{
-    json_t *done = npg_json_in(output, "done.json");
-    const char *verdict = json_string_value(json_object_get(done, "verdict"));
-    if (verdict) printf("%s: neupig view %s\n", verdict, output);
-    json_decref(done);
-}
-
 void npg_run_job_results(const char *verb, const char *output, npg_status status)
 {
     static const char *const names[] = {"meshes",      "reference.ply", "frames.jsonl", "exports.jsonl",
@@ -146,7 +129,10 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
         snprintf(path, sizeof path, "%s/%s", output, names[i]);
         if (npg_is_there(path)) printf("%-14s %s\n", names[i], path);
     }
-    print_verdict(output);
+    json_t *done = npg_json_in(output, "done.json"); /* how good it is, and how to look at it */
+    const char *verdict = json_string_value(json_object_get(done, "verdict"));
+    if (verdict) printf("%s: neupig view %s\n", verdict, output);
+    json_decref(done);
 }
 
 npg_status npg_run_once(const npg_options *options, npg_reporter *reporter)

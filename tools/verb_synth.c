@@ -127,16 +127,13 @@ static npg_status write_images(const settings *s, const npg_scan *capture, const
 {
     char folder[NPG_PATH_SIZE];
     NPG_TRY(npg_path_of(folder, s->output, "rig"));
-    npg_status status = t ? NPG_OK : npg_synth_rig_begin(folder, capture);
-    if (!status)
-        status = npg_synth_rig_frame(folder, capture, f->mesh, f->body.rest, t, 0.001 * s->depth_noise_mm);
-    return status;
+    return npg_synth_rig_frame(folder, capture, f->mesh, f->body.rest, t, 0.001 * s->depth_noise_mm);
 }
 
 static npg_status make_frames(const settings *s, npg_moving *f, npg_scanned *points, size_t *total)
 {
     npg_scan capture = {0};
-    int64_t change = f->kind->changes ? f->kind->change : s->frames;
+    int64_t change = f->kind->change;
     for (int64_t t = 0; t < s->frames; t++) {
         npg_moment moment = {s->cycles * (double)t / (double)s->frames, s->travel, (double)(t - change)};
         if (t == 0 || t == change) NPG_TRY(npg_moving_open(f, s->cell, t >= change));

@@ -3,7 +3,6 @@
 #include <stdio.h>
 
 #include "pipeline/file.h"
-#include "pipeline/memory.h"
 #include "tools/cli.h"
 #include "tools/view/view.h"
 
@@ -29,21 +28,15 @@ const npg_option npg_view_options[] = {
     {0}};
 /* clang-format on */
 
-static npg_status choose_output(char **output, const settings *s, const npg_cli *cli)
-{
-    if (s->output[0]) return npg_copy_text(output, s->output);
-    if (cli->operand_count > 1) return npg_copy_text(output, "compare.html");
-    return npg_join_path(output, cli->operands[0], "view.html");
-}
-
 npg_status npg_verb_view(const npg_cli *cli)
 {
     const settings *s = cli->values;
     npg_view_facts facts;
-    char *output;
+    char path[NPG_PATH_SIZE];
+    const char *output = s->output[0] ? s->output : cli->operand_count > 1 ? "compare.html" : path;
     if (s->live && cli->operand_count != 1)
         return npg_error(NPG_USAGE, "--live follows one run; %d folders were given", cli->operand_count);
-    NPG_TRY(choose_output(&output, s, cli));
+    NPG_TRY(npg_path_of(path, cli->operands[0], "view.html"));
     const npg_view_order order = {.paths = (const char *const *)cli->operands,
                                   .path_count = (size_t)cli->operand_count,
                                   .output = output,
@@ -57,6 +50,5 @@ npg_status npg_verb_view(const npg_cli *cli)
     if (!status)
         printf("%s: %zu frames, up to %zu vertices, %.1f MB\n", output, facts.frames, facts.vertices,
                (double)facts.bytes / 1e6);
-    npg_release(&output);
     return status;
 }

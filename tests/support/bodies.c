@@ -210,17 +210,17 @@ int main(int argc, char **argv)
         const char *name;
         npg_figure figure;
     } bodies[] = {{"walker", npg_walker},
-                  {"bar", {open_bar, pose_bar, false, -1}},
-                  {"hands", {open_hands, pose_hands, true, -1}},
-                  {"two", {open_coming, pose_bar, true, -1}},
-                  {"gone", {open_going, pose_bar, true, -1}}};
+                  {"bar", {open_bar, pose_bar, INT64_MAX}},
+                  {"hands", {open_hands, pose_hands, -1}},
+                  {"two", {open_coming, pose_bar, -1}},
+                  {"gone", {open_going, pose_bar, -1}}};
     const char *body = take(&argc, argv, "--body"), *change = take(&argc, argv, "--change");
     for (size_t i = 0; body && i < sizeof bodies / sizeof *bodies; i++) {
         if (strcmp(bodies[i].name, body) != 0) continue;
         figure = bodies[i].figure;
-        if (change) figure.change = strtoll(change, NULL, 10);
+        if (change && figure.change < 0) figure.change = strtoll(change, NULL, 10);
         int code = npg_cli_run(&synth, argc, argv);
-        if (!code && figure.changes) printf("changes at frame %lld\n", (long long)figure.change);
+        if (!code && figure.change < INT64_MAX) printf("changes at frame %lld\n", (long long)figure.change);
         return code;
     }
     fputs("neupig-bodies: --body walker|bar|hands|two|gone [--change FRAME] [options of neupig synth]\n",

@@ -1,6 +1,7 @@
 /* Batch: the list of captures, whatever it was made from. */
 #include "tools/batch/batch.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
@@ -131,24 +132,6 @@ static npg_status is_capture(bool *yes, const npg_batch *batch, const char *name
     return NPG_OK;
 }
 
-typedef struct listed {
-    npg_batch *batch;
-    char **names;
-    size_t count, capacity;
-} listed;
-
-static npg_status list_capture(void *user, const char *name)
-{
-    listed *l = user;
-    npg_arena *arena = &l->batch->arena;
-    bool yes;
-    NPG_TRY(is_capture(&yes, l->batch, name));
-    if (!yes) return NPG_OK;
-    NPG_TRY(npg_arena_grow(arena, &l->names, &l->capacity, l->count + 1, sizeof *l->names));
-    l->names[l->count++] = npg_arena_text(arena, name);
-    return npg_arena_status(arena);
-}
-
 /* The name of its folder in the output: without what can't be one (npg_batch_add()),
  * and not that of another. */
 static void name_of(char *out, size_t size, const npg_batch *batch, const char *name)
@@ -179,15 +162,23 @@ static npg_status add_capture(npg_batch *batch, const char *folder, const npg_ba
 
 static npg_status read_folder(npg_batch *batch, const npg_batch_given *given)
 {
-    listed l = {.batch = batch};
+    struct dirent **entries = NULL;
+    npg_status status = NPG_OK;
     if (!batch->output) return npg_error(NPG_USAGE, "no output folder; say where with -o DIR");
-    NPG_TRY(npg_folder_each(batch->path, NPG_BAD_INPUT, list_capture, &l));
-    if (!l.count)
+    int count = scandir(batch->path, &entries, NULL, versionsort);
+    if (count < 0) return npg_error_errno(NPG_BAD_INPUT, "can't list %s", batch->path);
+    for (int i = 0; i < count; i++) {
+        const char *name = entries[i]->d_name;
+        bool yes = false;
+        if (!status) status = is_capture(&yes, batch, name);
+        if (!status && yes)
+            status = npg_error_prefix(add_capture(batch, name, given), "%s/%s", batch->path, name);
+        free(entries[i]);
+    }
+    free(entries);
+    if (!status && !batch->count)
         return npg_error(NPG_BAD_INPUT, "%s: no sub-folder here, and each would be a capture", batch->path);
-    qsort(l.names, l.count, sizeof *l.names, npg_natural_order);
-    for (size_t i = 0; i < l.count; i++)
-        NPG_TRY(npg_error_prefix(add_capture(batch, l.names[i], given), "%s/%s", batch->path, l.names[i]));
-    return NPG_OK;
+    return status;
 }
 
 /* ---- the batch ---- */
@@ -197,19 +188,16 @@ bool npg_batch_is_mine(const npg_batch *batch, size_t i)
     return i % batch->task_count == batch->task_index;
 }
 
-static npg_status set_output(npg_batch *batch, const npg_batch_given *given)
-{
-    const char *text = npg_options_get(given->options, "output");
-    return text[0] ? npg_path_from(&batch->arena, &batch->output, ".", text) : NPG_OK;
-}
-
 static npg_status fill(npg_batch *batch, const char *path, const npg_batch_given *given)
 {
     struct stat info;
+    const char *output = npg_options_get(given->options, "output");
     batch->task_count = 1;
     batch->path = npg_arena_text(&batch->arena, path);
     NPG_TRY(npg_arena_status(&batch->arena));
-    NPG_TRY(set_output(batch, given));
+    if (output[0]) NPG_TRY(npg_path_from(&batch->arena, &batch->output, ".", output));
+    if (npg_options_is_set(given->options, "input"))
+        return npg_error(NPG_USAGE, "option input is not for a batch: its captures have theirs");
     if (stat(path, &info)) return npg_error(NPG_BAD_INPUT, "%s: %s", path, strerror(errno));
     batch->is_folder = S_ISDIR(info.st_mode);
     return batch->is_folder ? read_folder(batch, given) : npg_batch_read_manifest(batch, given);
@@ -218,8 +206,6 @@ static npg_status fill(npg_batch *batch, const char *path, const npg_batch_given
 npg_status npg_batch_open(npg_batch **out, const char *path, const npg_batch_given *given)
 {
     *out = NULL;
-    if (npg_options_is_set(given->options, "input"))
-        return npg_error(NPG_USAGE, "option input is not for a batch: its captures have theirs");
     NPG_TRY(npg_object_open(out, NPG_FOR_RUN, sizeof **out));
     npg_status status = fill(*out, path, given);
     if (status) npg_batch_close(out);

@@ -5,7 +5,7 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include <stdio.h>
-#include <sys/types.h>
+#include <sys/stat.h>
 
 #include "pipeline/memory.h"
 #include "pipeline/options.h"
@@ -98,10 +98,9 @@ typedef struct npg_process {
     int out, err;            /* its standard output and error; -1: closed               */
     json_t *progress;        /* its last record of that kind, owned; may be NULL        */
     double begun_s, asked_s; /* asked_s: when it was first asked to end, 0 before that  */
-    double reported_s;       /* when its progress was reported last                     */
     npg_stop_cause cause;
     bool was_killed;
-    long long done_before[3]; /* device, inode and time of done.json before the start; 0: none */
+    struct stat done_before; /* of done.json before the start; zeroed: there was none */
 } npg_process;
 
 /* Start the run of a capture: its folder, its log, the child.  NPG_DISK, NPG_FAILED. */
@@ -138,10 +137,9 @@ bool npg_verdict_is_done(const npg_verdict *verdict);
 void npg_verdict_read(npg_verdict *verdict, const npg_capture *capture);
 npg_status npg_verdict_write(const npg_capture *capture);
 
-/* Exit code of a batch: 75 when it was stopped before its end, 1 when a capture has failed
- * or is not done, 7 when one is done with frames skipped or below the quality bar, else 0.
- * Captures of this process, or of all. */
-int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped);
+/* How a batch ended: NPG_STOPPED before its end, NPG_FAILED when a capture has failed or is not done, NPG_PARTIAL when
+ * one is done with frames skipped or below the quality bar.  Captures of this process, or of all. */
+npg_status npg_batch_status(const npg_batch *batch, bool of_all, bool stopped);
 
 /* An object of name, input, output and what verdict.json says. */
 json_t *npg_verdict_json(const npg_capture *capture);

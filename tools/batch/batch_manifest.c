@@ -1,17 +1,5 @@
-/* Batch manifests.
- *
- *     {
- *         "output": "results",                       // -o wins
- *         "defaults": {"epochs": 60, "max-memory": 4000, "max-time": 7200},
- *         "captures": [
- *             {"input": "dancer"},
- *             {"input": "horse/scan_%04d.ply", "name": "horse", "method": "fit.json", "keep-going": true}
- *         ]
- *     }
- *
- * Beside "input", "name", "method" (a name, a file, or an object of keys, read first), "max-time" and "segments" (as --segments
- * of neupig run) a capture's keys are options of neupig run; its own win over the defaults.  Paths are taken
- * from the manifest's folder. */
+/* Batch manifests (samples/guide/batches.md has one): a capture's own keys win over the defaults, "method" (a name, a
+ * file, or an object of keys) is read first, and paths are taken from the manifest's folder. */
 #include <jansson.h>
 #include <stdio.h>
 #include <string.h>
@@ -32,11 +20,6 @@ typedef struct manifest {
 } manifest;
 
 /* ---- options ---- */
-
-static bool is_path(const char *key)
-{
-    return !strcmp(key, "reference");
-}
 
 static npg_status set_path(const manifest *m, npg_options *options, const char *key, const json_t *value)
 {
@@ -61,7 +44,7 @@ static npg_status set_key(const manifest *m, npg_capture *capture, const char *k
 {
     if (!strcmp(key, "input") || !strcmp(key, "name") || !strcmp(key, "method")) return NPG_OK;
     if (!strcmp(key, "output")) return npg_error(NPG_USAGE, "captures go to folders of the batch's output");
-    if (is_path(key)) return set_path(m, capture->options, key, value);
+    if (!strcmp(key, "reference")) return set_path(m, capture->options, key, value);
     if (!strcmp(key, "segments")) return set_segments(capture, value);
     if (strcmp(key, "max-time") != 0) return npg_options_set_json(capture->options, key, value);
     capture->max_time_s = json_number_value(value);
@@ -176,10 +159,8 @@ static npg_status check_top(json_t *root)
     if (defaults && !json_is_object(defaults)) return npg_error(NPG_USAGE, "defaults: not a JSON object");
     if (!json_is_array(captures)) return npg_error(NPG_USAGE, "captures: not a list of objects");
     if (!json_array_size(captures)) return npg_error(NPG_USAGE, "captures: the list is empty");
-    if (json_object_get(defaults, "input"))
-        return npg_error(NPG_USAGE, "defaults.input: each capture has its own");
-    if (json_object_get(defaults, "name"))
-        return npg_error(NPG_USAGE, "defaults.name: each capture has its own");
+    if (json_object_get(defaults, "input") || json_object_get(defaults, "name"))
+        return npg_error(NPG_USAGE, "defaults: each capture has its own \"input\" and \"name\"");
     return NPG_OK;
 }
 

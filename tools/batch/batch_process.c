@@ -9,7 +9,6 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -22,72 +21,29 @@
 
 #define GRACE_SECONDS 10 /* a run that was asked ends within 5 s; then it is killed */
 
-/* ---- the command ---- */
-
-typedef struct command {
-    npg_arena arena; /* of the words */
-    char **words;    /* ends with NULL */
-    size_t count, room;
-} command;
-
-static npg_status add_word(command *c, const char *name, const char *value)
-{
-    size_t size = strlen(name) + strlen(value) + 4;
-    NPG_TRY(npg_arena_grow(&c->arena, &c->words, &c->room, c->count + 2, sizeof *c->words));
-    char *word = c->words[c->count++] = npg_arena_take(&c->arena, size, 1);
-    if (word) snprintf(word, size, "%s%s%s%s", *value ? "--" : "", name, *value ? "=" : "", value);
-    return npg_arena_status(&c->arena);
-}
-
-/* What is set, as --<option>=<value>; the keys of the method as one object. */
-static npg_status add_options(command *c, const npg_options *options, json_t *method)
-{
-    npg_option_info info = {.struct_size = sizeof info};
-    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++) {
-        const char *value = npg_options_get(options, info.name);
-        if (!npg_options_is_set(options, info.name) || !*value || !strcmp(info.name, "input")) continue;
-        if (info.use == NPG_USE_COMMON)
-            NPG_TRY(add_word(c, info.name, value));
-        else
-            json_object_set_new(method, info.name, npg_json_text(value));
-    }
-    if (!json_object_size(method)) return NPG_OK;
-    char *text = json_dumps(method, JSON_COMPACT);
-    npg_status status = text ? add_word(c, "method", text) : npg_error(NPG_MEMORY, "no memory");
-    free(text);
-    return status;
-}
-
-/* neupig run --progress=json --quiet --log-file=OUT/log.jsonl --<option>=<value>... -- INPUT */
-static npg_status make_command(command *c, const npg_capture *capture, const char *log_path)
-{
-    NPG_TRY(add_word(c, "neupig", ""));
-    NPG_TRY(add_word(c, "run", ""));
-    NPG_TRY(add_word(c, "progress", "json"));
-    NPG_TRY(add_word(c, "quiet", "yes"));
-    NPG_TRY(add_word(c, "log-file", log_path));
-    if (capture->segments == NPG_BATCH_SEGMENTS_AUTO) NPG_TRY(add_word(c, "segments", "auto"));
-    json_t *method = json_object();
-    npg_status status = add_options(c, capture->options, method);
-    json_decref(method);
-    NPG_TRY(status);
-    NPG_TRY(add_word(c, "--", ""));
-    return add_word(c, capture->input, "");
-}
-
 /* ---- start ---- */
 
-static void stat_done(long long facts[3], const npg_capture *capture)
+static bool find_done(struct stat *info, const npg_capture *capture)
 {
     char path[NPG_PATH_SIZE];
-    struct stat info;
-    memset(facts, 0, 3 * sizeof *facts);
-    if (npg_path_of(path, capture->output, "done.json")) return;
-    if (!stat(path, &info)) {
-        facts[0] = (long long)info.st_dev;
-        facts[1] = (long long)info.st_ino;
-        facts[2] = (long long)info.st_mtim.tv_sec * 1000000000 + info.st_mtim.tv_nsec;
+    return !npg_path_of(path, capture->output, "done.json") && !stat(path, info);
+}
+
+/* What is set, as an object that --method takes, but for the paths that may be no UTF-8. */
+static char *text_of_options(const npg_options *options)
+{
+    npg_option_info info = {.struct_size = sizeof info};
+    json_t *method = json_object();
+    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++) {
+        const char *value = npg_options_get(options, info.name);
+        if (npg_options_is_set(options, info.name) && *value && strcmp(info.name, "input") != 0 &&
+            strcmp(info.name, "output") != 0)
+            json_object_set_new(method, strcmp(info.name, "method") != 0 ? info.name : "preset",
+                                npg_json_text(value));
     }
+    char *text = json_dumps(method, JSON_COMPACT);
+    json_decref(method);
+    return text;
 }
 
 static void log_record(const npg_capture *capture, json_t *record)
@@ -100,17 +56,10 @@ static void log_record(const npg_capture *capture, json_t *record)
     if (fd >= 0) close(fd);
 }
 
-static void log_command(const npg_capture *capture, const command *c)
-{
-    json_t *words = json_array();
-    for (size_t i = 0; i < c->count; i++) json_array_append_new(words, npg_json_text(c->words[i]));
-    log_record(capture, json_pack("{s:s,s:o}", "event", "command", "command", words));
-}
-
 /* What the child does first.  In its own process group, so that a signal from the terminal reaches it through this
  * process alone and that it can be killed with all that it has started; with no signal blocked; and it stops when the
  * batch is gone, however that ended. */
-static void become_run(const npg_process *p, const command *c, const char *parent)
+static void become_run(const npg_process *p, const char *const *words, const char *parent)
 {
     sigset_t none;
     int nothing = open("/dev/null", O_RDONLY);
@@ -122,12 +71,12 @@ static void become_run(const npg_process *p, const command *c, const char *paren
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
     closefrom(3);
-    execv("/proc/self/exe", c->words);
+    execv("/proc/self/exe", (char **)(uintptr_t)words);
     _exit(127);
 }
 
 /* Its output goes to files without a name, so that it never waits for anybody to read. */
-static npg_status start(npg_process *p, const command *c)
+static npg_status start(npg_process *p, const char *const *words)
 {
     char parent[24];
     snprintf(parent, sizeof parent, "%ld", (long)getpid());
@@ -137,7 +86,7 @@ static npg_status start(npg_process *p, const command *c)
         return npg_error_errno(NPG_FAILED, "can't take the output of neupig run");
     p->pid = fork();
     if (p->pid < 0) return npg_error_errno(NPG_FAILED, "can't start neupig run");
-    if (p->pid == 0) become_run(p, c, parent);
+    if (p->pid == 0) become_run(p, words, parent);
     setpgid(p->pid, p->pid); /* whoever is first */
     return NPG_OK;
 }
@@ -150,19 +99,44 @@ static void clear(npg_process *p)
     *p = (npg_process){.out = -1, .err = -1};
 }
 
+static npg_status run(npg_process *p, const char *log_path)
+{
+    const npg_capture *capture = p->capture;
+    char *options = text_of_options(capture->options);
+    bool in_segments = capture->segments == NPG_BATCH_SEGMENTS_AUTO;
+    const char *const words[] = {"neupig",
+                                 "run",
+                                 "--progress",
+                                 "json",
+                                 "--quiet",
+                                 "--log-file",
+                                 log_path,
+                                 "--segments",
+                                 in_segments ? "auto" : "one",
+                                 "--method",
+                                 options,
+                                 "--output",
+                                 capture->output,
+                                 "--",
+                                 capture->input,
+                                 NULL};
+    json_t *command = json_array();
+    for (size_t i = 0; words[i]; i++) json_array_append_new(command, npg_json_text(words[i]));
+    log_record(capture, json_pack("{s:s,s:o}", "event", "command", "command", command));
+    npg_status status = options ? start(p, words) : npg_error(NPG_MEMORY, "no memory");
+    free(options);
+    return status;
+}
+
 npg_status npg_process_start(npg_process *p, npg_capture *capture)
 {
-    command c = {.arena = {.purpose = NPG_FOR_RUN}};
     char log_path[NPG_PATH_SIZE];
     *p = (npg_process){.capture = capture, .out = -1, .err = -1, .begun_s = npg_clock_s()};
     npg_status status = npg_make_folder(capture->output);
-    if (!status) stat_done(p->done_before, capture);
-    if (!status && !p->done_before[1]) status = npg_file_remove(capture->output, "verdict.json");
+    if (!status && !find_done(&p->done_before, capture))
+        status = npg_file_remove(capture->output, "verdict.json");
     if (!status) status = npg_path_of(log_path, capture->output, "log.jsonl");
-    if (!status) status = make_command(&c, capture, log_path);
-    if (!status) log_command(capture, &c);
-    if (!status) status = start(p, &c);
-    npg_arena_release(&c.arena);
+    if (!status) status = run(p, log_path);
     if (status) clear(p);
     return status;
 }
@@ -236,10 +210,11 @@ void npg_process_watch(npg_process *p)
 /* It was done before and nothing was done to it: the earlier verdict's time and memory still hold. */
 static bool was_done(const npg_process *p, int how)
 {
-    long long now[3];
-    stat_done(now, p->capture);
+    struct stat now;
+    const struct stat *before = &p->done_before;
     bool good = WIFEXITED(how) && (WEXITSTATUS(how) == 0 || WEXITSTATUS(how) == 7);
-    return good && now[1] && !memcmp(now, p->done_before, sizeof now);
+    return good && find_done(&now, p->capture) && now.st_ino == before->st_ino &&
+           !memcmp(&now.st_mtim, &before->st_mtim, sizeof now.st_mtim);
 }
 
 static npg_status conclude(npg_process *p, int how, const struct rusage *used)

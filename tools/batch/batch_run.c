@@ -10,9 +10,8 @@
 #include "pipeline/json_file.h"
 #include "pipeline/memory.h"
 
-#define TICK_MS        200 /* between two looks at time and memory of the runs */
-#define AGAIN_SECONDS  1   /* a second signal sooner than that is the first on another way */
-#define RECORD_SECONDS 0.5 /* between two records of one capture's progress */
+#define TICK_MS       200 /* between two looks at time and memory of the runs */
+#define AGAIN_SECONDS 1   /* a second signal sooner than that is the first on another way */
 
 typedef struct work {
     npg_batch *batch;
@@ -77,23 +76,14 @@ static void report_progress(work *w)
     if (w->reporter->show == NPG_SHOW_BAR) w->hooks.progress(w->hooks.user, &progress);
 }
 
-static void print_progress(const work *w, npg_process *p)
+static void print_progress(const work *w, const npg_process *p)
 {
-    double now_s = npg_clock_s();
-    if (w->reporter->show != NPG_SHOW_JSON || now_s < p->reported_s + RECORD_SECONDS) return;
-    p->reported_s = now_s;
     json_t *record = json_pack("{s:s,s:o}", "event", "progress", "name", npg_json_text(p->capture->name));
     json_object_update_missing(record, p->progress);
     npg_reporter_print(w->reporter, record);
 }
 
 /* ---- signals ---- */
-
-static void stop_all(work *w)
-{
-    for (size_t i = 0; i < w->places; i++)
-        if (w->processes[i].capture) npg_process_stop(&w->processes[i], NPG_STOP_REQUEST);
-}
 
 /* Wait for a signal, the end of a run among them, or the next look, and take all that have come. */
 static void take_signals(work *w, long wait_ms)
@@ -108,7 +98,8 @@ static void take_signals(work *w, long wait_ms)
                              "stopping on request: the runs write their states");
         w->stopped = true;
         w->stopped_s = now_s;
-        stop_all(w);
+        for (size_t i = 0; i < w->places; i++)
+            if (w->processes[i].capture) npg_process_stop(&w->processes[i], NPG_STOP_REQUEST);
     }
 }
 
@@ -170,13 +161,6 @@ static void run_all(work *w)
     }
 }
 
-static npg_status open_places(work *w, size_t jobs)
-{
-    for (size_t i = 0; i < w->batch->count; i++) w->mine += npg_batch_is_mine(w->batch, i);
-    w->places = jobs < w->mine ? jobs : w->mine;
-    return npg_alloc_array(&w->processes, NPG_FOR_RUN, w->places, sizeof *w->processes);
-}
-
 npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, bool *stopped)
 {
     work w = {.batch = batch,
@@ -184,7 +168,9 @@ npg_status npg_batch_run(npg_batch *batch, npg_reporter *reporter, size_t jobs, 
               .hooks = npg_reporter_hooks(reporter),
               .begun_s = npg_clock_s()};
     sigset_t before;
-    npg_status status = open_places(&w, jobs);
+    for (size_t i = 0; i < batch->count; i++) w.mine += npg_batch_is_mine(batch, i);
+    w.places = jobs < w.mine ? jobs : w.mine;
+    npg_status status = npg_alloc_array(&w.processes, NPG_FOR_RUN, w.places, sizeof *w.processes);
     npg_signals_block(&w.signals, &before, SIGCHLD);
     if (!status) run_all(&w);
     take_signals(&w, 0); /* one that came at the very end */

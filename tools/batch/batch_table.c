@@ -149,9 +149,10 @@ static npg_status write_json(const npg_batch *batch, const figures *all)
     json_t *captures = json_array();
     for (size_t i = 0; i < batch->count; i++)
         json_array_append_new(captures, json_of_capture(&batch->captures[i], &all[i]));
-    json_t *root = json_pack("{s:s,s:o,s:o,s:i,s:o}", "neupig", npg_version(), "batch",
-                             npg_json_text(batch->path), "output", npg_json_text(batch->output), "exit_code",
-                             npg_batch_exit_code(batch, true, false), "captures", captures);
+    json_t *root =
+        json_pack("{s:s,s:o,s:o,s:i,s:o}", "neupig", npg_version(), "batch", npg_json_text(batch->path),
+                  "output", npg_json_text(batch->output), "exit_code",
+                  npg_status_exit_code(npg_batch_status(batch, true, false)), "captures", captures);
     npg_status status = root ? npg_json_write(batch->output, "batch.json", root)
                              : npg_error(NPG_MEMORY, "no memory for batch.json");
     json_decref(root);

@@ -88,18 +88,21 @@ bool npg_verdict_is_done(const npg_verdict *v)
     return v->is_known && (v->exit_code == 0 || v->exit_code == 7);
 }
 
-int npg_batch_exit_code(const npg_batch *batch, bool of_all, bool stopped)
+npg_status npg_batch_status(const npg_batch *batch, bool of_all, bool stopped)
 {
-    int code = 0;
+    size_t mine = 0, bad = 0, partial = 0;
     for (size_t i = 0; i < batch->count; i++) {
         const npg_verdict *v = &batch->captures[i].verdict;
         if (!of_all && !npg_batch_is_mine(batch, i)) continue;
-        if (!npg_verdict_is_done(v))
-            code = 1;
-        else if (v->exit_code == 7 && !code)
-            code = 7;
+        mine++;
+        bad += !npg_verdict_is_done(v);
+        partial += v->exit_code == 7;
     }
-    return stopped && code == 1 ? npg_status_exit_code(NPG_STOPPED) : code;
+    if (bad && stopped) return NPG_STOPPED;
+    if (bad)
+        return npg_error(NPG_FAILED, "%zu of %zu captures are not done; see %s/batch.json", bad, mine,
+                         batch->output);
+    return partial ? NPG_PARTIAL : NPG_OK;
 }
 
 /* ---- segments ---- */

@@ -87,14 +87,6 @@ static npg_status run_segment(const npg_segments *s, const npg_segment *segment,
 
 /* ---- cutting ---- */
 
-static npg_status read_topology(json_t **topology, const npg_segments *s, const npg_segment *segment)
-{
-    char folder[NPG_PATH_SIZE];
-    NPG_TRY(npg_segment_path(folder, s, segment));
-    *topology = npg_json_in(folder, "topology.json");
-    return *topology ? NPG_OK : npg_error(NPG_DISK, "can't read back %s/topology.json", folder);
-}
-
 /* The segment of the keyframe keeps its side of the cut; the result is the other. */
 static npg_segment cut_segment(npg_segment *kept, const json_t *topology, int64_t overlap)
 {
@@ -122,9 +114,11 @@ static npg_segment cut_segment(npg_segment *kept, const json_t *topology, int64_
 static npg_status split_segment(npg_segments *s, size_t at, const npg_options *options,
                                 npg_reporter *reporter)
 {
-    json_t *topology;
+    char folder[NPG_PATH_SIZE];
     npg_segment *segment = &s->list[at];
-    NPG_TRY(read_topology(&topology, s, segment));
+    NPG_TRY(npg_segment_path(folder, s, segment));
+    json_t *topology = npg_json_in(folder, "topology.json");
+    if (!topology) return npg_error(NPG_DISK, "can't read back %s/topology.json", folder);
     int64_t key = segment->first - segment->shared_first +
                   (int64_t)json_integer_value(json_object_get(topology, "key_index"));
     NPG_TRY(npg_segment_remove(s, segment));

@@ -31,8 +31,7 @@ typedef struct npg_figure {
     npg_status (*open)(npg_body *body, double cell, bool is_changed);
     /* The positions of its V vertices (V x 3) at a moment. */
     void (*pose)(const npg_body *body, float *vert_pos, const npg_moment *moment);
-    bool changes;   /* its topology, once          */
-    int64_t change; /* in this frame; -1: half way */
+    int64_t change; /* the frame in which its topology changes; -1: half way, INT64_MAX: never */
 } npg_figure;
 
 extern const npg_figure npg_walker;
@@ -126,19 +125,13 @@ npg_synth_camera npg_synth_camera_of_ring(const npg_scan *capture, int64_t i);
 /* What each pixel (y * width + x) sees of a surface; t is the depth along `ahead`.  hits: H x W. */
 npg_status npg_synth_look(npg_ray_hit *hits, const npg_surface *surface, const npg_synth_camera *camera);
 
-/* The point at a depth behind a pixel. */
-void npg_synth_unproject(double pos[3], const npg_synth_camera *camera, int64_t at, double depth);
-
 /* ---- rigs: depth and colour images of a textured body, with rig.json (samples/guide/rigs.md) ---- */
 
 /* The texture: colour of a place of the body at rest (metres), sRGB. */
 void npg_synth_colour(uint8_t rgba[4], const double rest[3]);
 
-/* FOLDER/rig.json and a folder per camera of the ring. */
-npg_status npg_synth_rig_begin(const char *folder, const npg_scan *capture);
-
-/* Images of one frame of every camera: mesh is the body posed, rest the same vertices at rest; noise_m:
- * Gaussian deviation of the depths. */
+/* Images of one frame of every camera; with the first FOLDER/rig.json and a folder per camera of the ring.  mesh is the
+ * body posed, rest the same vertices at rest; noise_m: Gaussian deviation of the depths. */
 npg_status npg_synth_rig_frame(const char *folder, const npg_scan *capture, const npg_mesh *mesh,
                                const npg_mesh *rest, int64_t frame, double noise_m);
 

@@ -96,24 +96,14 @@ static void add_outliers(npg_scanned *points, const npg_scan *capture, uint64_t 
     }
 }
 
-static npg_status sample_surface(npg_scanned *points, const npg_scan *capture, const npg_mesh *mesh,
-                                 size_t count, uint64_t frame)
-{
-    NPG_TRY(make_room(points, count));
-    points->count = count;
-    return npg_mesh_sample(points->pos, points->normals, mesh, count, capture->seed, frame, FOR_SAMPLES);
-}
-
 /* ---- a ring of depth cameras around the body ---- */
-
-#define PI 3.14159265358979323846
 
 /* At half the diagonal's height above the middle, turned to the middle. */
 npg_synth_camera npg_synth_camera_of_ring(const npg_scan *capture, int64_t i)
 {
     /* Far enough that the whole body is in the picture; at two heights, so that tops of limbs are seen. */
     const double distance = 1.3 * capture->diagonal, lift = i % 2 ? 0.10 : 0.35;
-    double angle = 2 * PI * (double)i / (double)capture->cameras;
+    double angle = 2 * M_PI * (double)i / (double)capture->cameras;
     int64_t height = capture->height ? capture->height : capture->width;
     int64_t side = height < capture->width ? height : capture->width;
     npg_synth_camera c = {.width = capture->width, .height = height, .focal = 0.95 * (double)side};
@@ -128,18 +118,12 @@ npg_synth_camera npg_synth_camera_of_ring(const npg_scan *capture, int64_t i)
     return c;
 }
 
-/* What one pixel further along `ahead` is. */
-static void look_through(double out[3], const npg_synth_camera *c, int64_t at)
+/* From the eye to the point at a depth behind a pixel. */
+static void look_through(double out[3], const npg_synth_camera *c, int64_t at, double depth)
 {
     double x = ((double)(at % c->width) + 0.5 - 0.5 * (double)c->width) / c->focal;
     double y = ((double)(at / c->width) + 0.5 - 0.5 * (double)c->height) / c->focal;
-    for (int k = 0; k < 3; k++) out[k] = c->ahead[k] + x * c->right[k] + y * c->up[k];
-}
-
-void npg_synth_unproject(double pos[3], const npg_synth_camera *c, int64_t at, double depth)
-{
-    look_through(pos, c, at);
-    for (int k = 0; k < 3; k++) pos[k] = c->eye[k] + depth * pos[k];
+    for (int k = 0; k < 3; k++) out[k] = depth * (c->ahead[k] + x * c->right[k] + y * c->up[k]);
 }
 
 npg_status npg_synth_look(npg_ray_hit *hits, const npg_surface *surface, const npg_synth_camera *c)
@@ -149,7 +133,7 @@ npg_status npg_synth_look(npg_ray_hit *hits, const npg_surface *surface, const n
     NPG_TRY(npg_alloc_array(&rays, NPG_FOR_FRAMES, pixels, sizeof *rays));
     for (size_t at = 0; at < pixels; at++) {
         double direction[3];
-        look_through(direction, c, (int64_t)at);
+        look_through(direction, c, (int64_t)at, 1);
         rays[at].t_max = INFINITY;
         for (int k = 0; k < 3; k++) {
             rays[at].origin[k] = (float)c->eye[k];
@@ -168,8 +152,8 @@ static npg_status add_seen_points(npg_scanned *points, const npg_ray_hit *hits, 
     for (int64_t at = 0; at < c->width * c->height; at++) {
         double pos[3], normal[3];
         if (hits[at].face == UINT32_MAX || hits[at].is_back) continue;
-        npg_synth_unproject(pos, c, at,
-                            (double)hits[at].t + (noise > 0 ? noise * npg_random_gauss(random) : 0));
+        look_through(pos, c, at, (double)hits[at].t + (noise > 0 ? noise * npg_random_gauss(random) : 0));
+        for (int k = 0; k < 3; k++) pos[k] += c->eye[k];
         npg_face_normal(normal, mesh->vert_pos, mesh->faces + 3 * (size_t)hits[at].face);
         NPG_TRY(add_point(points, pos, normal));
     }
@@ -213,7 +197,10 @@ npg_status npg_scan_frame(npg_scanned *points, const npg_scan *capture, const np
         cut_holes(points, capture, frame);
         choose(points, count, npg_random_stream(capture->seed, frame, FOR_CHOICE));
     } else {
-        NPG_TRY(sample_surface(points, capture, mesh, count, frame));
+        NPG_TRY(make_room(points, count));
+        points->count = count;
+        NPG_TRY(
+            npg_mesh_sample(points->pos, points->normals, mesh, count, capture->seed, frame, FOR_SAMPLES));
         cut_holes(points, capture, frame);
         if (capture->noise > 0) add_noise(points, capture, frame);
     }

@@ -54,22 +54,16 @@ static json_t *json_of_camera(const npg_synth_camera *c, int64_t i)
                      "pose", pose);
 }
 
-static npg_status make_folder(const char *folder, int64_t i)
-{
-    char name[32], path[NPG_PATH_SIZE];
-    snprintf(name, sizeof name, "camera%lld", (long long)i);
-    NPG_TRY(npg_path_of(path, folder, name));
-    return npg_make_folder(path);
-}
-
-npg_status npg_synth_rig_begin(const char *folder, const npg_scan *capture)
+static npg_status begin_rig(const char *folder, const npg_scan *capture)
 {
     json_t *sensors = json_array();
+    char path[4096];
     npg_status status = NPG_OK;
     for (int64_t i = 0; i < capture->cameras && !status; i++) {
         npg_synth_camera c = upright(capture, i);
         json_array_append_new(sensors, json_of_camera(&c, i));
-        status = make_folder(folder, i);
+        snprintf(path, sizeof path, "%s/camera%lld", folder, (long long)i);
+        status = npg_make_folder(path);
     }
     json_t *rig = json_pack("{si ss sf so}", "neupig_rig", 1, "unit", "m", "depth_scale", DEPTH_STEP,
                             "sensors", sensors);
@@ -132,6 +126,7 @@ npg_status npg_synth_rig_frame(const char *folder, const npg_scan *capture, cons
     npg_synth_camera first = upright(capture, 0);
     size_t pixels = (size_t)(first.width * first.height);
     npg_arena scratch = {.purpose = NPG_FOR_FRAMES};
+    if (!frame) NPG_TRY(begin_rig(folder, capture));
     im.seen = npg_arena_take(&scratch, pixels, sizeof *im.seen);
     im.depth = npg_arena_take(&scratch, pixels, sizeof *im.depth);
     im.colour = npg_arena_take(&scratch, pixels, 3);

@@ -4,8 +4,6 @@
 
 #include "tools/synth/synth.h"
 
-#define PI 3.14159265358979323846
-
 /* A bone turns about its joint; sides come as pairs, left (x > 0) first.  Metres; sizes and angles of the
  * gait were set by eye. */
 typedef struct bone {
@@ -109,12 +107,12 @@ void npg_walker_gait(double angles[3], int b, const npg_moment *moment)
 {
     double phase = moment->phase;
     bool right = b >= 3 && b % 2 == 0;
-    double side = right ? -1 : 1, cycle = 2 * PI * phase + (right ? PI : 0), swing = sin(cycle);
+    double side = right ? -1 : 1, cycle = 2 * M_PI * phase + (right ? M_PI : 0), swing = sin(cycle);
     angles[0] = angles[1] = angles[2] = 0;
     switch (b) {
-    case 0: angles[1] = 0.12 * sin(2 * PI * phase); break;
-    case 1: angles[1] = -0.24 * sin(2 * PI * phase); break;
-    case 2: angles[0] = 0.05 * cos(4 * PI * phase); break;
+    case 0: angles[1] = 0.12 * sin(2 * M_PI * phase); break;
+    case 1: angles[1] = -0.24 * sin(2 * M_PI * phase); break;
+    case 2: angles[0] = 0.05 * cos(4 * M_PI * phase); break;
     case 3:
     case 4:
         angles[0] = 0.55 * swing;
@@ -147,7 +145,7 @@ void npg_walker_bones(npg_bone_pose out[NPG_BONES], npg_gait_fn *gait, const npg
         } else {
             memcpy(out[b].rotation, local, sizeof local);
             moved_joint[0] = it->joint[0];
-            moved_joint[1] = it->joint[1] + 0.02 * cos(4 * PI * moment->phase);
+            moved_joint[1] = it->joint[1] + 0.02 * cos(4 * M_PI * moment->phase);
             moved_joint[2] = it->joint[2] + moment->travel * moment->phase;
         }
         for (int k = 0; k < 3; k++) {
@@ -236,7 +234,7 @@ static void pose_walker(const npg_body *body, float *vert_pos, const npg_moment 
     npg_walker_bend(body, vert_pos, bones);
 }
 
-const npg_figure npg_walker = {.open = open_walker, .pose = pose_walker};
+const npg_figure npg_walker = {open_walker, pose_walker, INT64_MAX};
 
 /* ---- figures ---- */
 

@@ -139,7 +139,7 @@ json_t *npg_view_result_json(const npg_view_result *result);
  *     wide u32 frames, bytes of positions, of errors, of points
  *     u32 points of each frame
  *     positions                  per frame x of all vertices, then y, z: of the first frame, of later ones
- *                                the change since the one before; predicted and packed (view_codec.h)
+ *                                the change since the one before; predicted and packed
  *     errors                     per frame 0 to 255, per vertex the distance to the nearest point:
  *                                d = (value / 255)^2 x NPG_VIEW_ERROR_MAX diagonals; predicted and packed.
  *                                255 is that or more, all of a frame is 0 without points

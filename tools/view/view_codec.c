@@ -78,15 +78,12 @@ static npg_status deflate_all(npg_bytes *out, uint8_t *bytes, size_t size)
     if (size > UINT32_MAX / 2) return npg_error(NPG_USAGE, "a block of %zu bytes is too large", size);
     if (deflateInit2(&stream, LEVEL, Z_DEFLATED, 15, 9, Z_FILTERED) != Z_OK)
         return npg_error(NPG_MEMORY, "no memory to compress");
-    size_t most = deflateBound(&stream, (uLong)size);
-    npg_status status = npg_grow(&out->data, &out->capacity, out->size + most, 1, NPG_FOR_FILES);
-    if (!status) {
-        stream.next_out = out->data + out->size;
-        stream.avail_out = (uInt)most;
-        if (deflate(&stream, Z_FINISH) != Z_STREAM_END)
-            status = npg_error(NPG_FAILED, "zlib: %s", stream.msg);
-        out->size += stream.total_out;
-    }
+    stream.avail_out = (uInt)deflateBound(&stream, (uLong)size);
+    npg_status status = npg_grow(&out->data, &out->capacity, out->size + stream.avail_out, 1, NPG_FOR_FILES);
+    stream.next_out = status ? NULL : out->data + out->size;
+    if (!status && deflate(&stream, Z_FINISH) != Z_STREAM_END)
+        status = npg_error(NPG_FAILED, "zlib: %s", stream.msg);
+    out->size += stream.total_out;
     deflateEnd(&stream);
     return status;
 }

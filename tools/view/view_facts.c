@@ -20,13 +20,6 @@ static json_t *json_of_frame(const npg_view_frame *frame)
     return out;
 }
 
-static json_t *json_of_frames(const npg_view_part *part)
-{
-    json_t *frames = json_array();
-    for (size_t i = 0; i < part->count; i++) json_array_append_new(frames, json_of_frame(&part->frames[i]));
-    return frames;
-}
-
 /* ---- windows ---- */
 
 /* All frames of the run, those that are not solved yet as well. */
@@ -69,15 +62,16 @@ static json_t *json_of_windows(const npg_view_part *part)
 static json_t *json_of_part(const npg_view_part *part)
 {
     const npg_mesh *mesh = part->reference;
-    json_t *topology = npg_json_at(part->report, "stages.evaluate.topology");
+    json_t *topology = npg_json_at(part->report, "stages.evaluate.topology"), *frames = json_array();
     json_t *out =
         json_pack("{so sI sI sI sI sf sf sf so so}", "label", npg_json_text(part->label), "vertices",
                   (json_int_t)(mesh ? mesh->vert_count : 0), "faces",
                   (json_int_t)(mesh ? mesh->face_count : 0), "group", (json_int_t)part->group, "frame_count",
                   (json_int_t)frames_in_all(part), "diagonal", part->diagonal, "cover", part->cover_share,
                   "bar", npg_view_number(npg_view_run_options(part), "bars.residual", 0.5), "windows",
-                  json_of_windows(part), "frames", json_of_frames(part));
+                  json_of_windows(part), "frames", frames);
     if (!out) return NULL;
+    for (size_t i = 0; i < part->count; i++) json_array_append_new(frames, json_of_frame(&part->frames[i]));
     if (part->origin.known)
         json_object_set_new(
             out, "origin",

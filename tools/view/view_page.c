@@ -28,19 +28,14 @@ template;
 #define MARK      "<!--neupig-data-->"
 #define SIZE_MOST ((size_t)64 << 20)
 
-static bool find_template(char path[4096])
-{
-    if (npg_find_installed(path, "share/neupig/", NAME)) return true;
-    snprintf(path, 4096, "%s/%s", NPG_DATA_DIR, NAME);
-    return access(path, R_OK) == 0;
-}
-
 /* NPG_FAILED where it was not built, with what to install. */
 static npg_status open_template(template *page)
 {
     char path[4096];
     *page = (template){.arena = {.purpose = NPG_FOR_FILES}};
-    if (!find_template(path))
+    if (!npg_find_installed(path, "share/neupig/", NAME))
+        snprintf(path, sizeof path, "%s/%s", NPG_DATA_DIR, NAME);
+    if (access(path, R_OK))
         return npg_error(NPG_FAILED,
                          "the page's script was not built: it needs Node and npm. Install them "
                          "(Debian: nodejs and npm), configure with -DNPG_VIEW=ON and build again");
@@ -115,22 +110,16 @@ static npg_status write_groups(npg_file *file, npg_view_frames *frames, const ch
     return status;
 }
 
-static void add_facts(npg_view_facts *facts, const npg_view_frames *frames)
-{
-    const npg_view_part *part = frames->part;
-    if (frames->without_points && !facts->without_points) memcpy(facts->why, frames->why, sizeof facts->why);
-    facts->without_points += frames->without_points;
-    facts->frames += part->count;
-    if (part->reference->vert_count > facts->vertices) facts->vertices = part->reference->vert_count;
-}
-
 static npg_status write_part(npg_file *file, npg_view_facts *facts, json_t *json, const npg_view_part *part,
                              const char *id, size_t point_limit)
 {
     npg_view_frames frames;
     NPG_TRY(npg_view_frames_open(&frames, part, point_limit));
     npg_status status = write_groups(file, &frames, id);
-    add_facts(facts, &frames);
+    if (frames.without_points && !facts->without_points) memcpy(facts->why, frames.why, sizeof facts->why);
+    facts->without_points += frames.without_points;
+    facts->frames += part->count;
+    if (part->reference->vert_count > facts->vertices) facts->vertices = part->reference->vert_count;
     json_object_set_new(json, "with_points", json_integer((json_int_t)frames.with_points));
     if (frames.without_points) json_object_set_new(json, "no_points", npg_json_text(frames.why));
     npg_arena_release(&frames.arena);

@@ -14,21 +14,10 @@
 
 /* ---- the mesh ---- */
 
-static npg_status take_mesh(npg_view_frames *frames, const npg_mesh *mesh, const char *path)
-{
-    const npg_mesh *reference = frames->part->reference;
-    size_t v = reference->vert_count;
-    if (mesh->vert_count != v)
-        return npg_error(NPG_BAD_INPUT, "%s has %zu vertices, its reference.ply %zu", path, mesh->vert_count,
-                         v);
-    NPG_TRY(npg_mesh_require_finite(mesh, path));
-    memcpy(frames->vert_pos, mesh->vert_pos, 3 * v * sizeof *frames->vert_pos);
-    return NPG_OK;
-}
-
 npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *frame)
 {
     npg_origin origin = frames->part->origin;
+    size_t v = frames->part->reference->vert_count;
     npg_mesh *mesh = NULL;
     char path[NPG_PATH_SIZE];
     if (!frame->file) return NPG_OK;
@@ -37,7 +26,11 @@ npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *fra
                          frames->part->folder, frame->file);
     NPG_TRY(npg_path_of(path, frames->part->folder, frame->file));
     npg_status status = npg_read_mesh(&mesh, path, &origin);
-    if (!status) status = take_mesh(frames, mesh, path);
+    if (!status && mesh->vert_count != v)
+        status =
+            npg_error(NPG_BAD_INPUT, "%s has %zu vertices, its reference.ply %zu", path, mesh->vert_count, v);
+    if (!status) status = npg_mesh_require_finite(mesh, path);
+    if (!status) memcpy(frames->vert_pos, mesh->vert_pos, 3 * v * sizeof *frames->vert_pos);
     npg_mesh_unref(&mesh);
     return status;
 }

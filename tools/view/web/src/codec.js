@@ -1,4 +1,4 @@
-// The other half of tools/view/view_codec.h and view_frame.h: blocks of bytes back to meshes and points.
+// The other half of tools/view/view.h: blocks of bytes back to meshes and points.
 
 const POINT_STEP = 16; // NPG_VIEW_POINT_STEP
 export const ERROR_MAX = 0.05; // NPG_VIEW_ERROR_MAX, in diagonals
