@@ -17,11 +17,6 @@ npg_mlp_places npg_mlp_places_of(const npg_mlp_shape *s)
     return at;
 }
 
-size_t npg_mlp_packed(size_t rows, size_t row, size_t column)
-{
-    return column / NPG_PANEL * NPG_PANEL * rows + row * NPG_PANEL + column % NPG_PANEL;
-}
-
 static size_t widest(const npg_mlp_shape *s)
 {
     return s->w1 > s->w2 ? s->w1 : s->w2;

@@ -23,9 +23,6 @@ typedef struct npg_mlp_places {
 } npg_mlp_places;
 npg_mlp_places npg_mlp_places_of(const npg_mlp_shape *shape);
 
-/* Where element (row, column) of a packed matrix with `rows` rows lies. */
-size_t npg_mlp_packed(size_t rows, size_t row, size_t column);
-
 typedef struct npg_mlp {
     npg_program *program, *time;
     npg_mlp_shape shape;

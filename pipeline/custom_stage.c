@@ -83,7 +83,7 @@ static npg_status do_frame(npg_worker *worker, npg_frame *frame)
                            .coverage = has_figures ? frame->figures.coverage : (double)NAN};
     NPG_TRY(show_points(&view, worker, frame));
     if (frame->vert_unit) show_vertices(&view, npg_worker_facts(worker), frame);
-    npg_error_restore(NPG_OK, "");
+    npg_error_set(NPG_OK, "");
     NPG_TRY(result_of(custom->given.frame(custom->given.user, &view)));
     return apply_changes(worker, frame);
 }

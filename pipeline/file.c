@@ -245,7 +245,7 @@ npg_status npg_file_commit(npg_file **slot)
     if (!file->status && rename(file->hidden_path, file->path)) keep_failure(file, "rename to");
     /* Where the folder can't be synced the file stands under its name already: the failure is reported all
      * the same. */
-    npg_status status = file->status ? npg_error_restore(file->status, file->cause) : sync_folder(file);
+    npg_status status = file->status ? npg_error_set(file->status, file->cause) : sync_folder(file);
     if (file->status) unlink(file->hidden_path);
     npg_object_close(slot);
     return status;

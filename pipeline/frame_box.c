@@ -54,11 +54,10 @@ void npg_origin_offer(npg_origin *origin, const double world[3])
 
 npg_status npg_frame_box_set(npg_frame_box *box, const npg_origin *origin, const npg_bounds *bounds)
 {
-    double longest = 0;
+    double longest = npg_bounds_longest(bounds);
     for (int a = 0; a < 3; a++) {
         double side = bounds->hi[a] - bounds->lo[a];
         if (!(side >= 0) || !isfinite(side)) return npg_error(NPG_BAD_INPUT, "no frame has a usable point");
-        longest = fmax(longest, side);
         box->origin[a] = origin->world[a];
         box->centre[a] = bounds->lo[a] + side / 2;
     }

@@ -412,6 +412,19 @@ const char *npg_options_get(const npg_options *options, const char *name)
     return option ? text_of(options, option, at) : NULL;
 }
 
+json_t *npg_options_json(const npg_options *options, const char *const *left_out)
+{
+    const npg_option *option;
+    json_t *values = json_object();
+    for (size_t i = 0; (option = npg_option_at(i, NULL)); i++) {
+        const char *const *out = left_out;
+        while (out && *out && strcmp(*out, option->name) != 0) out++;
+        if (!out || !*out)
+            json_object_set_new(values, option->name, npg_json_text(npg_options_get(options, option->name)));
+    }
+    return values;
+}
+
 void npg_option_store(const npg_option *option, const char *text, void *state)
 {
     void *slot = (char *)state + option->offset;

@@ -28,10 +28,7 @@ typedef struct npg_option {
  *     NPG_ROW_INT ("epochs", AT(epochs),  "10",    0,     1e6,  "N",
  *         "help"),
  */
-#define NPG_ROW(type, ...)                                                                                   \
-    {                                                                                                        \
-        NPG_##type##_FIELDS(__VA_ARGS__)                                                                     \
-    }
+#define NPG_ROW(...)        NPG_ROW_FOR(NPG_USE_COMMON, __VA_ARGS__)
 #define NPG_ROW_FLAG(...)   NPG_ROW(FLAG, __VA_ARGS__)
 #define NPG_ROW_INT(...)    NPG_ROW(INT, __VA_ARGS__)
 #define NPG_ROW_REAL(...)   NPG_ROW(REAL, __VA_ARGS__)
@@ -119,11 +116,14 @@ npg_status npg_custom_check(const npg_custom_stage *given, const struct npg_stag
 /* A row of a table as its description. */
 npg_option_info npg_option_info_of(const npg_option *option, const char *stage);
 
+/* {name: value} of all of npg_chain's but those named (NULL at the end; NULL: all).  A new object. */
+struct json_t;
+struct json_t *npg_options_json(const npg_options *options, const char *const *left_out);
+
 /* Whether the user (not a preset, not the default) set it. */
 bool npg_options_is_set(const npg_options *options, const char *name);
 
 /* npg_options_set() from a JSON text, number or true/false; of "method" also an object of keys. */
-struct json_t;
 npg_status npg_options_set_json(npg_options *options, const char *name, const struct json_t *value);
 
 /* Why there is no option of this name, and what to do instead; NULL when there never was one. */

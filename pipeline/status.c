@@ -60,11 +60,6 @@ npg_status npg_error_errno(npg_status fallback, const char *format, ...)
     return npg_error(status, "%s: %s", text, strerror(cause));
 }
 
-npg_status npg_error_restore(npg_status status, const char *text)
-{
-    return npg_error(status, "%s", text);
-}
-
 npg_status npg_error_set(npg_status status, const char *text)
 {
     return npg_error(status, "%s", text ? text : "");

@@ -19,9 +19,6 @@ npg_status npg_error_prefix(npg_status status, const char *format, ...) NPG_PRIN
  * NPG_MEMORY, else fallback. */
 npg_status npg_error_errno(npg_status fallback, const char *format, ...) NPG_PRINTF(2, 3);
 
-/* Take over a text kept elsewhere (a failure that came from another thread). */
-npg_status npg_error_restore(npg_status status, const char *text);
-
 /* Misuse by the caller of a public function. */
 #define NPG_REQUIRE(condition)                                                                               \
     do {                                                                                                     \

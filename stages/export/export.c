@@ -9,7 +9,6 @@
 #include "job/job.h"
 #include "pipeline/json_file.h"
 #include "pipeline/options.h"
-#include "pipeline/order.h"
 
 typedef enum numbering { NUMBER_OF_FILE, NUMBER_OF_INDEX } numbering;
 
@@ -24,7 +23,7 @@ typedef struct export_state {
     npg_placement map;
     npg_mesh_names names;
     npg_export_choice choice;
-    int64_t *numbers; /* of all frames, while measuring; owned */
+    int64_t *numbers; /* of all frames, while measuring: they grow, as ingest sees to; owned */
     size_t number_count, number_capacity;
     npg_frame_log *list;
     npg_arena arena;     /* of what follows */
@@ -86,7 +85,7 @@ static void set_width(export_state *state, const npg_facts *facts)
     state->names.width = npg_number_width(last);
 }
 
-/* ---- measuring pass: would the names be in each other's or an earlier run's way? ---- */
+/* ---- measuring pass: would the names be in an earlier run's way? ---- */
 
 /* The results must not land among the frames they are made of. */
 static npg_status check_source(const npg_worker *worker, const npg_frame *frame)
@@ -136,16 +135,8 @@ static npg_status note_number(npg_worker *worker, const npg_frame *frame)
 static npg_status check_numbers(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
-    if (!state->number_count) return NPG_OK;
-    qsort(state->numbers, state->number_count, sizeof *state->numbers, npg_order_int64);
-    for (size_t i = 1; i < state->number_count; i++)
-        if (state->numbers[i] == state->numbers[i - 1])
-            return npg_error(
-                NPG_BAD_INPUT,
-                "two frames have the number %lld and would be written to one file: set numbering to index",
-                (long long)state->numbers[i]);
     set_width(state, npg_worker_facts(worker));
-    if (state->overwrite || npg_worker_facts(worker)->is_live) return NPG_OK;
+    if (!state->number_count || state->overwrite || npg_worker_facts(worker)->is_live) return NPG_OK;
     return npg_folder_check(output_of(worker), &state->names, state->numbers, state->number_count);
 }
 
@@ -403,15 +394,6 @@ static npg_status close_frames(npg_worker *worker)
 
 /* ---- the last files ---- */
 
-static json_t *json_of_options(const npg_options *options)
-{
-    json_t *values = json_object();
-    npg_option_info info = {.struct_size = sizeof info};
-    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
-        json_object_set_new(values, info.name, npg_json_text(npg_options_get(options, info.name)));
-    return values;
-}
-
 static npg_status conclude(npg_worker *worker)
 {
     export_state *state = npg_worker_state(worker);
@@ -428,7 +410,7 @@ static npg_status conclude(npg_worker *worker)
                   npg_json_at(whole, "stages.evaluate.verdict"), "meshes",
                   json_object_get(npg_worker_report(worker), "meshes"));
     report_settings(head, state);
-    json_object_set_new(head, "options", json_of_options(npg_worker_options(worker)));
+    json_object_set_new(head, "options", npg_options_json(npg_worker_options(worker), NULL));
     npg_status status = npg_done_end(output, head, state->choice.chosen[0]);
     json_decref(head);
     return status ? status : npg_job_end(npg_job_of(worker));

@@ -69,7 +69,7 @@ static npg_status look_for_end(const npg_job *job, bool *is_done, bool *was_part
     *was_partial = json_integer_value(json_object_get(done, "exit_code")) == 7;
     json_decref(done);
     npg_status status = *is_done ? npg_verify(&files, job->output, NULL, NULL) : NPG_OK;
-    return status == NPG_BAD_INPUT ? npg_error_restore(NPG_USAGE, npg_error_text()) : status;
+    return status == NPG_BAD_INPUT ? npg_error_set(NPG_USAGE, npg_error_text()) : status;
 }
 
 /* ---- the store ---- */

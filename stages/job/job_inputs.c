@@ -16,16 +16,6 @@
 static const char *const free_options[] = {"input",  "output", "ring",        "chunk",   "max-memory",
                                            "pull",   "cache",  "overwrite",   "confine", "restart",
                                            "append", "alarm",  "segment-min", "follow",  NULL};
-/* Of a live source: what ends it.  Kept for npg_options_load_job(), not compared. */
-static const char *const end_options[] = {"follow-end.name", "follow-end.idle", NULL};
-
-static bool is_one_of(const char *const *names, const char *name)
-{
-    for (; *names; names++)
-        if (!strcmp(name, *names)) return true;
-    return false;
-}
-
 npg_job_source npg_job_source_of(const npg_settings *settings)
 {
     if (settings->follow[0]) return NPG_JOB_FOLLOW;
@@ -36,16 +26,6 @@ npg_job_source npg_job_source_of(const npg_settings *settings)
 static const char *const source_words[] = {"files", "follow", "stream", "push"};
 
 /* ---- describing ---- */
-
-static json_t *describe_options(const npg_options *options)
-{
-    json_t *values = json_object();
-    npg_option_info info = {.struct_size = sizeof info};
-    for (size_t i = 0; npg_options_describe(i, &info) == NPG_OK; i++)
-        if (!is_one_of(free_options, info.name))
-            json_object_set_new(values, info.name, npg_json_text(npg_options_get(options, info.name)));
-    return values;
-}
 
 /* The stages that a program added, "name after place" each; their code can't be compared. */
 static json_t *describe_custom_stages(const npg_options *options)
@@ -134,8 +114,8 @@ npg_status npg_job_describe(json_t **out, const npg_options *options)
     json_t *description =
         json_pack("{ss si so so so so so so}", "neupig", npg_version(), "layout", LAYOUT, "input",
                   source > NPG_JOB_FOLLOW ? npg_json_text(input) : absolute(input), "options",
-                  describe_options(options), "custom_stages", describe_custom_stages(options), "reference",
-                  mesh, "files", files, "frames", frames);
+                  npg_options_json(options, free_options), "custom_stages", describe_custom_stages(options),
+                  "reference", mesh, "files", files, "frames", frames);
     if (source) json_object_set_new(description, "source", json_string(source_words[source]));
     if (!status && !description) status = npg_error(NPG_MEMORY, "no memory for the list of inputs");
     if (status) json_decref(description);
@@ -176,7 +156,8 @@ static npg_status compare_options(const json_t *then, const json_t *now)
     json_object_foreach((json_t *)now, name, value)
     {
         const char *was = text_of(then, name), *is = text_of(now, name);
-        if (is_one_of(end_options, name)) continue;
+        if (!strncmp(name, "follow-end.", 11))
+            continue; /* what ends a live source is kept for npg_options_load_job() */
         if (!json_object_get(then, name))
             return npg_error(NPG_USAGE, "option %s is new and is \"%s\"", name, is);
         if (strcmp(was, is) != 0)

@@ -299,19 +299,6 @@ static void the_number_is_as_wide_as_the_largest(void **state)
     assert_true(exists(in_out("wide", "meshes/frame_1234567.ply")));
 }
 
-static void two_frames_of_one_number_need_the_index(void **state)
-{
-    (void)state;
-    scene s = plain_scene();
-    s.numbers[3] = 7;
-    const char *const by_index[][2] = {{"numbering", "index"}, {NULL, NULL}};
-    assert_int_equal(run_scene(&s, "double", NULL), NPG_BAD_INPUT);
-    assert_non_null(strstr(last_text, "number 7"));
-    assert_int_equal(run_scene(&s, "double", by_index), NPG_OK);
-    assert_true(exists(in_out("double", "meshes/frame_0000.ply")));
-    assert_true(exists(in_out("double", "meshes/frame_0004.ply")));
-}
-
 static void a_skipped_frame_is_listed_without_a_mesh(void **state)
 {
     (void)state;
@@ -479,7 +466,6 @@ int main(void)
         cmocka_unit_test(scale_and_axes_change_what_is_written),
         cmocka_unit_test(senseless_options_are_refused),
         cmocka_unit_test(the_number_is_as_wide_as_the_largest),
-        cmocka_unit_test(two_frames_of_one_number_need_the_index),
         cmocka_unit_test(a_skipped_frame_is_listed_without_a_mesh),
         cmocka_unit_test(another_runs_meshes_are_not_mixed_in),
         cmocka_unit_test(a_run_that_fails_leaves_no_done),

@@ -24,7 +24,7 @@ static void texts_are_kept_and_prefixed(void **state)
     assert_string_equal(npg_error_text(), "frame 3: a.ply: line 7");
     npg_error(NPG_FAILED, "again: %s", npg_error_text()); /* the text itself as an argument */
     assert_string_equal(npg_error_text(), "again: frame 3: a.ply: line 7");
-    npg_error_restore(NPG_DISK, "100% full");
+    npg_error_set(NPG_DISK, "100% full");
     assert_string_equal(npg_error_text(), "100% full");
 }
 

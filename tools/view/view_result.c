@@ -78,7 +78,7 @@ static npg_status read_frames(npg_arena *arena, npg_view_part *part, int64_t eve
     NPG_TRY(npg_path_of(path, part->folder, name));
     int64_t size = whole_lines(path);
     npg_status status = size ? npg_json_lines(part->folder, name, size, add_frame, &r) : NPG_OK;
-    if (status == NPG_DISK) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
+    if (status == NPG_DISK) status = npg_error_set(NPG_BAD_INPUT, npg_error_text());
     if (!status && !part->count && !may_be_empty)
         status = npg_error(NPG_BAD_INPUT, "%s: no frame is solved yet", part->folder);
     if (part->count) qsort(part->frames, part->count, sizeof *part->frames, by_index);
@@ -172,7 +172,7 @@ static npg_status list_parts(npg_view_result *result)
 {
     npg_segments segments = {.output = result->path};
     npg_status status = npg_segments_load(&segments);
-    if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
+    if (status == NPG_USAGE) status = npg_error_set(NPG_BAD_INPUT, npg_error_text());
     for (size_t i = 0; i < segments.count && !status; i++) status = add_part(result, segments.list[i].folder);
     npg_segments_clear(&segments);
     if (!status && !result->part_count) status = add_part(result, ".");

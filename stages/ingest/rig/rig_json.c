@@ -148,7 +148,7 @@ static npg_status find_numbered(npg_rig *rig, const char *at, const char *key, c
                    "(rig_json.py makes it of a file with times)");
     NPG_TRY(npg_rig_path(rig, &path, pattern, false));
     npg_status status = npg_paths_find(paths, path);
-    if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
+    if (status == NPG_USAGE) status = npg_error_set(NPG_BAD_INPUT, npg_error_text());
     if (!status && !paths->numbers) status = bad(at, key, "must be a pattern with the frame's number");
     return status < 0 ? npg_error_prefix(status, "%s.%s", at, key) : status;
 }
@@ -336,7 +336,7 @@ npg_status npg_rig_load_json(npg_rig *rig)
     char *file = npg_is_folder(rig->path) ? npg_arena_path(&rig->arena, rig->path, "rig.json") : rig->path;
     NPG_TRY(npg_arena_status(&rig->arena));
     npg_status status = npg_json_read(&root, file, TEXT_MAX);
-    if (status == NPG_USAGE) status = npg_error_restore(NPG_BAD_INPUT, npg_error_text());
+    if (status == NPG_USAGE) status = npg_error_set(NPG_BAD_INPUT, npg_error_text());
     if (!status && (status = load_root(rig, root)) == NPG_BAD_INPUT) npg_error_prefix(status, "%s", file);
     json_decref(root);
     return status;

@@ -9,6 +9,12 @@ typedef struct layers {
     double h1[WIDTH_MAX], h2[WIDTH_MAX];
 } layers;
 
+/* Where element (row, column) of a packed matrix with `rows` rows lies. */
+static size_t packed(size_t rows, size_t row, size_t column)
+{
+    return column / NPG_PANEL * NPG_PANEL * rows + row * NPG_PANEL + column % NPG_PANEL;
+}
+
 static double leaky(double x)
 {
     return x > 0 ? x : NPG_MLP_SLOPE * x;
@@ -26,7 +32,7 @@ static void first_layer(double *h, const double *z, const double *code, const do
                  *b1 = params + npg_mlp_places_of(s).b1;
     for (size_t n = 0; n < s->w1; n++) {
         double sum = b1[n];
-        for (size_t c = 0; c < CHANNELS; c++) sum += z[c] * w1z[npg_mlp_packed(CHANNELS, c, n)];
+        for (size_t c = 0; c < CHANNELS; c++) sum += z[c] * w1z[packed(CHANNELS, c, n)];
         for (size_t j = 0; j < s->code_size; j++) sum += code[j] * w1t[j * s->w1 + n];
         h[n] = leaky(sum);
     }
@@ -39,7 +45,7 @@ static void hidden(layers *to, const double *z, const double *code, const double
     first_layer(to->h1, z, code, params, s);
     for (size_t n = 0; n < s->w2; n++) {
         double sum = b2[n];
-        for (size_t k = 0; k < s->w1; k++) sum += to->h1[k] * params[npg_mlp_packed(s->w1, k, n)];
+        for (size_t k = 0; k < s->w1; k++) sum += to->h1[k] * params[packed(s->w1, k, n)];
         to->h2[n] = leaky(sum);
     }
 }
@@ -79,8 +85,8 @@ static void second_back(double *d1, double *grad, const double *d2, const double
     for (size_t k = 0; k < s->w1; k++) {
         double sum = 0;
         for (size_t n = 0; n < s->w2; n++) {
-            sum += d2[n] * params[npg_mlp_packed(s->w1, k, n)];
-            grad[npg_mlp_packed(s->w1, k, n)] += h1[k] * d2[n];
+            sum += d2[n] * params[packed(s->w1, k, n)];
+            grad[packed(s->w1, k, n)] += h1[k] * d2[n];
         }
         d1[k] = leaky_back(sum, h1[k]);
     }
@@ -93,7 +99,7 @@ static void first_back(double *grad, double *dz, const double *d1, const double 
     size_t at_z = npg_mlp_places_of(s).w1z, at_t = npg_mlp_places_of(s).w1t;
     for (size_t n = 0; n < s->w1; n++) {
         for (size_t c = 0; c < CHANNELS; c++) {
-            size_t at = at_z + npg_mlp_packed(CHANNELS, c, n);
+            size_t at = at_z + packed(CHANNELS, c, n);
             dz[c] += d1[n] * params[at];
             grad[at] += d1[n] * z[c];
         }
