@@ -121,7 +121,7 @@ typedef struct follower {
     size_t node_count;
     double *pose, *before, *next; /* K x 12 each */
     float *vert_unit;             /* V x 3       */
-    bool with_normals, is_judged;
+    bool with_normals;
     npg_candidate_seen seen;
     void *user;
 } follower;
@@ -147,26 +147,22 @@ static npg_status follow_to(follower *f, const npg_candidate_cloud *next)
     f->before = f->pose;
     f->pose = f->next;
     f->next = oldest;
-    const npg_tracker_cloud all = {.points = next->points,
-                                   .normals = f->with_normals ? next->normals : NULL,
-                                   .count = next->point_count};
-    const npg_tracker_cloud some = {.points = next->fit,
-                                    .normals = f->with_normals ? next->fit_normals : NULL,
-                                    .count = next->fit_count,
-                                    .sensors = next->sensors,
-                                    .sensor_count = next->sensor_count,
-                                    .space = next->space};
-    NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, f->is_judged ? &some : &all, NULL, NULL));
+    const npg_tracker_cloud cloud = {.points = next->fit,
+                                     .normals = f->with_normals ? next->fit_normals : NULL,
+                                     .count = next->fit_count,
+                                     .sensors = next->sensors,
+                                     .sensor_count = next->sensor_count,
+                                     .space = next->space};
+    NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, &cloud, NULL, NULL));
     npg_tracker_vertices(f->tracker, f->vert_unit, f->pose);
-    return f->seen(f->user, next, f->vert_unit, &tracked);
+    return f->seen(f->user, next, f->vert_unit);
 }
 
 npg_status npg_candidate_follow(const npg_candidate_clouds *clouds, size_t from, npg_mesh *mesh,
-                                const npg_tracker_settings *settings, bool is_judged, npg_candidate_seen seen,
-                                void *user)
+                                const npg_tracker_settings *settings, npg_candidate_seen seen, void *user)
 {
     npg_arena scratch = {.purpose = NPG_FOR_FIT};
-    follower f = {.clouds = clouds, .is_judged = is_judged, .seen = seen, .user = user};
+    follower f = {.clouds = clouds, .seen = seen, .user = user};
     f.with_normals = clouds->given && (double)clouds->flipped <= FLIPPED_MOST * (double)clouds->given;
     npg_status status = open_follower(&f, &scratch, mesh, settings);
     for (int step = -1; step <= 1 && !status; step += 2) {

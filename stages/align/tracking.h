@@ -252,12 +252,8 @@ void npg_tracker_since(const npg_tracker *tracker, float *since, const float *be
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);
 
-/* Candidate clouds: the frames of the choosing pass, thinned, and how a surface made from one of them
- * fares in the others.
- *
- * A surface from one frame is followed from frame to frame by the coarse tracker (tracking.h), outward in both
- * directions.  Where limbs that touch in its frame were joined, that must either hold other frames' limbs
- * together, away from their points, or stretch far: both can be seen. */
+/* Candidate clouds: the frames of the choosing pass, thinned, and how a surface made from one of them fares in
+ * the others: it is followed from frame to frame by the coarse tracker, outward in both directions. */
 
 #define NPG_CANDIDATE_POINTS 8000 /* of a frame, at most */
 
@@ -298,14 +294,12 @@ void npg_candidate_clouds_close(npg_candidate_clouds **clouds);
 size_t npg_candidate_clouds_find(const npg_candidate_clouds *clouds, int64_t index);
 
 /* Sees the surface in one frame: vert_unit (V x 3) is a loan. */
-typedef npg_status (*npg_candidate_seen)(void *user, const npg_candidate_cloud *cloud, const float *vert_unit,
-                                         const npg_tracked *tracked);
+typedef npg_status (*npg_candidate_seen)(void *user, const npg_candidate_cloud *cloud,
+                                         const float *vert_unit);
 
-/* Follow the surface (unit coordinates, with normals) of list[from] through all others; seen is called once
- * for each of them.  is_judged: by what was not held out alone, as far as the sensors could see it; else by all
- * points, wherever they were seen from.  NPG_MEMORY, NPG_DIVERGED, or what seen returns. */
+/* Follow the surface (unit coordinates, with normals) of list[from] through all others, by what was not held
+ * out of them; seen is called once for each.  NPG_MEMORY, NPG_DIVERGED, or what seen returns. */
 npg_status npg_candidate_follow(const npg_candidate_clouds *clouds, size_t from, npg_mesh *mesh,
-                                const npg_tracker_settings *settings, bool is_judged, npg_candidate_seen seen,
-                                void *user);
+                                const npg_tracker_settings *settings, npg_candidate_seen seen, void *user);
 
 #endif

@@ -136,13 +136,11 @@ static npg_status surface_off(double *mean, judging *j, const npg_candidate_clou
     return NPG_OK;
 }
 
-static npg_status judge_frame(void *user, const npg_candidate_cloud *cloud, const float *vert_unit,
-                              const npg_tracked *tracked)
+static npg_status judge_frame(void *user, const npg_candidate_cloud *cloud, const float *vert_unit)
 {
     judging *j = user;
     npg_judgement *out = j->judgement;
     double points, surface, behind;
-    (void)tracked;
     if (j->settings->should_stop && j->settings->should_stop(j->settings->user))
         return npg_error(NPG_STOPPED, "stopped while a reference was judged");
     NPG_TRY(npg_surface_move(j->surface, vert_unit));
@@ -179,7 +177,7 @@ npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *cloud
     *judgement = (npg_judgement){0};
     for (size_t i = 0; i < NPG_CHOICE_FRAMES; i++) judgement->of_frame[i] = (double)NAN;
     npg_status status = open_judging(&j);
-    if (!status) status = npg_candidate_follow(clouds, at, mesh, &judge_tracking, true, judge_frame, &j);
+    if (!status) status = npg_candidate_follow(clouds, at, mesh, &judge_tracking, judge_frame, &j);
     npg_surface_close(&j.surface);
     npg_arena_release(&j.arena);
     return status;
