@@ -10,6 +10,7 @@
 #include "align/align_internal.h"
 #include "align/tracking.h"
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "job/job.h"
 #include "pipeline/cost.h"
 #include "pipeline/options.h"
@@ -31,8 +32,7 @@
 /* While a reference that is one side of the body grows, points past its border are carried by the border's
  * motion, which is theirs while the body moves as one piece: then it is followed as far as it has places for
  * half of a frame's points, else as far as stage fuse says. */
-#define EXPLAINED_STIFF 0.5
-#define BENT            0.01 /* of its diagonal, what a rigid motion leaves; by trial, tests/bed/decisions.md */
+#define BENT 0.01 /* of its diagonal, what a rigid motion leaves; by trial, tests/bed/decisions.md */
 
 typedef struct state {
     bool is_on;
@@ -251,7 +251,7 @@ static npg_status reaches(bool *is_reached, const npg_worker *worker, const npg_
     double bend, size = npg_points_diagonal(reference->vert_pos, reference->vert_count);
     NPG_TRY(npg_pose_bend(&bend, npg_tracker_graph(s->tracker), w->pose));
     *is_reached = w->tracked.explained >=
-                  (bend > BENT * size ? npg_worker_facts(worker)->brief.explained_least : EXPLAINED_STIFF);
+                  (bend > BENT * size ? npg_worker_facts(worker)->brief.explained_least : NPG_MAJORITY);
     return NPG_OK;
 }
 

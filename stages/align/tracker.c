@@ -6,6 +6,7 @@
 
 #include "align/align_internal.h"
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/parallel.h"
 
@@ -20,7 +21,6 @@
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface            */
 /* Set by trial, like those above. */
 #define SCHEDULE    1.5  /* stiffness and width are final after 2/3 of the steps; the last third settles */
-#define NOISE_WIDTH 2.5  /* mean distances of points that the robust weight is wide at least */
 #define SETTLED     0.01 /* of the graph's radius: a step that moves no node farther ends the fit */
 #define PAIR_WIDTHS 3.0  /* samples farther than so many widths from every point have no pair: a hole */
 #define ONE_SIDE    20   /* times the stiffness where one sensor leaves half of the body to the edges */
@@ -523,7 +523,7 @@ static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_
     s->stiffness = s->t->settings.stiffness * pow(effort->stiffness, 1 - progress) * (1 + noise * noise);
     if (s->cloud->sensor_count == 1) s->stiffness *= ONE_SIDE;
     s->width = s->t->size * effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
-    s->width = fmax(s->width, NOISE_WIDTH * tracked->point_dist_mean);
+    s->width = fmax(s->width, NPG_WITHIN * tracked->point_dist_mean);
 }
 
 static npg_status do_step(step *s, npg_tracked *tracked, double *pose)

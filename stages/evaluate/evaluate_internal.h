@@ -48,7 +48,8 @@ void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float
  * where fewer than 20 points would be expected or that has fewer than 6 vertices' share of the area.
  * A reference with a border, or one that saw only a part of its frame, is never unsupported, stretched or
  * vacated: what cameras see differs.  Where it is known what of the surface they could see in a frame, the
- * rest of it is neither unsupported nor stretched, and has no share of the points. */
+ * rest of it is neither unsupported nor stretched, and has no share of the points; nor is what no point of the
+ * reference supports (vert_unseen). */
 
 typedef struct npg_misfit_finder npg_misfit_finder;
 

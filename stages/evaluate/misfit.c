@@ -5,23 +5,21 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "pipeline/frame_box.h"
 
 /* Set by trial.  evaluate_internal.h says how they are used. */
-#define REACH_SPACINGS 3.0   /* of the points on the surface                                          */
-#define REACH_SIZE     0.015 /* of the reference's diagonal                                           */
-#define REACH_MEDIANS  5.0   /* times the points' median distance: noise                              */
-#define REACH_MOST     2.0   /* times what it is without noise                                        */
-#define LINK_SPACINGS  2.0   /* between neighbours in a cluster of far points                         */
-#define LINKS          6     /* neighbours that are searched for others of the cluster                */
-#define UNSEEN_MOST    0.02  /* of the reference: more than that, and it is of cameras that see parts */
-#define BESIDE_SIZE    0.15  /* of the diagonal: as far beyond a border lies surface not seen before  */
-#define STRETCH_LEAST  1.5   /* times an edge's length in the reference                               */
-#define OFF_SHARE      0.6   /* of the reach: stretched surface lies off the points                        */
-#define LEAST_FAR      12    /* points in a place                                                     */
-#define LEAST_MISSED   20    /* points that would lie on a place of the surface                       */
-#define LEAST_VERTS    6     /* vertices whose mean area it has                                       */
-#define VACATED_SHARE  0.6   /* of the points that a part should have                                 */
+#define REACH_SPACINGS 3.0 /* of the points on the surface                                          */
+#define REACH_MEDIANS  5.0 /* times the points' median distance: noise                              */
+#define REACH_MOST     2.0 /* times what it is without noise                                        */
+#define LINK_SPACINGS  2.0 /* between neighbours in a cluster of far points                         */
+#define LINKS          6   /* neighbours that are searched for others of the cluster                */
+#define STRETCH_LEAST  1.5 /* times an edge's length in the reference                               */
+#define OFF_SHARE      0.6 /* of the reach: stretched surface lies off the points                        */
+#define LEAST_FAR      12  /* points in a place                                                     */
+#define LEAST_MISSED   20  /* points that would lie on a place of the surface                       */
+#define LEAST_VERTS    6   /* vertices whose mean area it has                                       */
+#define VACATED_SHARE  0.6 /* of the points that a part should have                                 */
 
 struct npg_misfit_finder {
     npg_arena arena;           /* of all below, but for the edges               */
@@ -65,7 +63,7 @@ npg_status npg_misfit_open(npg_misfit_finder **out, const npg_mesh *reference, d
     NPG_TRY(npg_object_open(out, NPG_FOR_MESH, sizeof **out));
     npg_misfit_finder *finder = *out;
     finder->reference = reference;
-    finder->is_closed = unseen_share <= UNSEEN_MOST;
+    finder->is_closed = unseen_share <= NPG_FEW;
     npg_status status = measure_reference(finder);
     if (status) npg_misfit_close(out);
     return status;
@@ -104,7 +102,7 @@ static npg_status largest_far(npg_patch *place, npg_arena *scratch, const float 
 /* Points beyond the border of a reference that its frame saw in part are of what it did not see. */
 static bool is_far(const npg_misfit_finder *f, const npg_surface_hit *hit, double reach)
 {
-    double dist_sq = (double)hit->dist_sq, beside = BESIDE_SIZE * f->size;
+    double dist_sq = (double)hit->dist_sq, beside = NPG_REMOTE_SHARE * f->size;
     if (!(dist_sq > reach * reach)) return false;
     const uint32_t *face = f->reference->faces + 3 * (size_t)hit->face;
     return !npg_hit_on_border(hit, face, f->is_border) || dist_sq > beside * beside;
@@ -134,11 +132,14 @@ static bool is_in_sight(const npg_misfit_frame *frame, size_t v)
     return !frame->is_in_sight || frame->is_in_sight[v];
 }
 
-/* Flag the vertices that are further than `reach` from all points, though a sensor could see them. */
+/* Flag the vertices that are further than `reach` from all points, though a sensor could see them and points of
+ * the reference did: what was closed over nothing is no evidence. */
 static void flag_off(npg_misfit_finder *f, const npg_misfit_frame *frame, double reach)
 {
+    const uint8_t *vert_unseen = f->reference->vert_unseen;
     for (size_t i = 0; i < f->reference->vert_count; i++)
-        f->flags[i] = (double)frame->vert_dist_sq[i] > reach * reach && is_in_sight(frame, i);
+        f->flags[i] = (double)frame->vert_dist_sq[i] > reach * reach && is_in_sight(frame, i) &&
+                      !(vert_unseen && vert_unseen[i]);
 }
 
 static npg_status take_flagged(npg_misfit *misfit, const npg_misfit_finder *f, const npg_misfit_frame *frame)
@@ -209,9 +210,9 @@ static void find_vacated(npg_misfit_finder *f, npg_misfit *misfit, const npg_mis
 npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_misfit_frame *frame)
 {
     double spacing = frame->point_count ? sqrt(frame->area / (double)frame->point_count) : 0;
-    double least = fmax(REACH_SPACINGS * spacing, REACH_SIZE * f->size);
+    double least = fmax(REACH_SPACINGS * spacing, NPG_DETAIL_SHARE * f->size);
     double reach = fmin(fmax(least, REACH_MEDIANS * frame->point_dist_median), REACH_MOST * least);
-    double link = fmax(LINK_SPACINGS * spacing, REACH_SIZE * f->size);
+    double link = fmax(LINK_SPACINGS * spacing, NPG_DETAIL_SHARE * f->size);
     for (int i = 0; i < NPG_MISFITS; i++)
         misfits[i] = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
     NPG_TRY(find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link));

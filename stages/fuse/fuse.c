@@ -18,6 +18,7 @@
 
 #include "fuse/fuse_internal.h"
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "mesh/surface.h"
 #include "pipeline/cost.h"
 #include "pipeline/options.h"
@@ -25,13 +26,9 @@
 #include "reference/loop.h"
 
 /* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
-#define POINTS_A_CELL   1    /* that a cell should average, from all frames ...                        */
-#define SIDE_LEAST      0.25 /* ... but for its side, in spacings of the keyframe's points             */
-#define NEAR_MEDIANS    2.5  /* median distances within which a point lies on the surface but for noise */
-#define FAR_SPACINGS    2.5  /* spacings beyond which a point belongs to nothing that is known         */
-#define MISALIGNED      2.5  /* usual median distances: a frame that is farther off has lost its way   */
-#define FRAMES_SHARE    0.05 /* of all frames must have seen a place, ...                              */
-#define FRAMES_AT_LEAST 2    /* ... and so many                                                        */
+#define POINTS_A_CELL 1    /* that a cell should average, from all frames ...                        */
+#define SIDE_LEAST    0.25 /* ... but for its side, in spacings of the keyframe's points             */
+#define FRAMES_SHARE  0.05 /* of all frames must have seen a place, ...                              */
 
 #define COLOUR_SIDE                                                                                          \
     1 /* side of a cube that colours are averaged over, in spacings of the keyframe's points */
@@ -47,17 +44,13 @@
 #define EMPTY_MOST   300000 /* cells at most: larger ones then                                    */
 #define EMPTY_BIN    0.5    /* of a depth map, at the points' distance                            */
 #define EMPTY_MARGIN 0.3    /* that a place must be before what was seen ...                      */
-#define EMPTY_NOISE  2.5    /* ... and so many deviations of the points' noise                    */
-#define EMPTY_FRAMES 2      /* at least must have seen it empty                                   */
 /* Of the frames that say anything of a place: what is left is how often a frame is wrongly followed. */
 #define CONTRADICTED 0.2
 
 /* While a reference that is one side of the body grows. */
-#define GROW_SIZE        0.1  /* of its diagonal: so far past its border points are taken to be of the body */
-#define GROW_WEIGHT      0.25 /* of such a point, one on the surface being 1                              */
-#define DENSE_SPACINGS   1.5  /* of the keyframe's points, or ...                                         */
-#define DENSE_CELLS      4    /* ... sides of a cell, within which a place must have ...                  */
-#define DENSE_NEIGHBOURS 16   /* ... so many others, itself counted: single ones are of other parts       */
+#define GROW_WEIGHT    0.25 /* of such a point, one on the surface being 1                              */
+#define DENSE_SPACINGS 1.5  /* of the keyframe's points, or ...                                         */
+#define DENSE_CELLS    4    /* ... sides of a cell, within which a place must have ...                  */
 
 enum { FROM_KEY, FROM_ALL };
 
@@ -184,7 +177,7 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
                      .points = c->points,
                      .point_count = c->count,
                      .bin = EMPTY_BIN * s->spacing,
-                     .margin = EMPTY_MARGIN * s->spacing + EMPTY_NOISE * s->noise};
+                     .margin = EMPTY_MARGIN * s->spacing + NPG_WITHIN * s->noise};
     if (!s->empty)
         NPG_TRY(npg_carving_open(&s->empty, facts->reference, EMPTY_SIDE * s->spacing,
                                  EMPTY_BAND * s->spacing, EMPTY_MOST));
@@ -215,7 +208,7 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     NPG_TRY(npg_skin_open(&s->skin, facts->reference));
     if (facts->sensor_count_max && npg_skin_is_open(s->skin))
         s->grow_dist =
-            GROW_SIZE * npg_points_diagonal(facts->reference->vert_pos, facts->reference->vert_count);
+            NPG_NEARBY_SHARE * npg_points_diagonal(facts->reference->vert_pos, facts->reference->vert_count);
     return NPG_OK;
 }
 
@@ -230,15 +223,15 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     npg_skin_pose(s->skin, frame->vert_unit);
     NPG_TRY(npg_skin_to_rest(s->skin, c->warped, c->points, c->normals, c->count));
     NPG_TRY(median_dist(&median, c, s->grow_dist > 0));
-    if (s->frames > 1 && median > MISALIGNED * s->usual) {
+    if (s->frames > 1 && median > NPG_WITHIN * s->usual) {
         s->misaligned++;
         return NPG_OK;
     }
     s->usual = (s->usual * (double)s->frames + median) / (double)(s->frames + 1);
     s->frames++;
     NPG_TRY(look_around(worker, c, frame));
-    return add_points(s, c, frame->index, NEAR_MEDIANS * median,
-                      fmax(FAR_SPACINGS * s->spacing, NEAR_MEDIANS * median));
+    return add_points(s, c, frame->index, NPG_WITHIN * median,
+                      fmax(NPG_WITHIN * s->spacing, NPG_WITHIN * median));
 }
 
 static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
@@ -260,12 +253,11 @@ static npg_status drop_scattered(npg_fused *fused, double radius)
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
     npg_neighbours near;
     size_t n = fused->count;
-    if (n < DENSE_NEIGHBOURS) return NPG_OK;
+    if (n < NPG_PATCH) return NPG_OK;
     uint8_t *keep = npg_arena_take(&scratch, n, 1);
-    npg_status status =
-        npg_neighbours_take(&near, &scratch, fused->points, n, fused->points, n, DENSE_NEIGHBOURS);
+    npg_status status = npg_neighbours_take(&near, &scratch, fused->points, n, fused->points, n, NPG_PATCH);
     for (size_t i = 0; i < n && !status; i++)
-        keep[i] = (double)near.dist_sq[(i + 1) * DENSE_NEIGHBOURS - 1] <= radius * radius;
+        keep[i] = (double)near.dist_sq[(i + 1) * NPG_PATCH - 1] <= radius * radius;
     if (!status) fused->count = npg_points_keep(fused->points, fused->normals, n, keep);
     npg_arena_release(&scratch);
     return status;
@@ -275,9 +267,9 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
 {
     const state *s = npg_worker_state(worker);
     size_t most = npg_cells_count(s->cells);
-    double least = fmax(FRAMES_AT_LEAST, FRAMES_SHARE * (double)s->frames);
+    double least = fmax(NPG_CONFIRMED, FRAMES_SHARE * (double)s->frames);
     /* What is new may be seen by the last frame that is reached alone. */
-    bool is_one_enough = s->frames < 2 * FRAMES_AT_LEAST || npg_worker_facts(worker)->brief.is_growing;
+    bool is_one_enough = s->frames < 2 * NPG_CONFIRMED || npg_worker_facts(worker)->brief.is_growing;
     int64_t frames_least = is_one_enough ? 1 : (int64_t)least;
     NPG_TRY(npg_alloc_array(&fused->points, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&fused->normals, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
@@ -309,7 +301,7 @@ static npg_status collect_empty(const state *s, npg_fused *fused)
     NPG_TRY(npg_alloc_array(&fused->empty, NPG_FOR_MESH, most, 3 * sizeof(float)));
     fused->empty_side = npg_carving_side(s->empty);
     fused->empty_count = npg_carving_find(s->empty, fused->empty,
-                                          s->frames < 2 * EMPTY_FRAMES ? 1 : EMPTY_FRAMES, CONTRADICTED);
+                                          s->frames < 2 * NPG_CONFIRMED ? 1 : NPG_CONFIRMED, CONTRADICTED);
     return NPG_OK;
 }
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "outlier/normals.h"
 
 #define NEIGHBOURS    48   /* in which a facing point is looked for */
@@ -129,7 +130,7 @@ static void choose_around(around *to, const float *vert_normal, const uint32_t *
                           const npg_gap_widening *widening)
 {
     float scale = 0;
-    for (size_t k = 0; k < NPG_POINTS_ASKED && near[k] < widening->count && to->count < BACK_OVER; k++) {
+    for (size_t k = 0; k < NPG_PATCH && near[k] < widening->count && to->count < BACK_OVER; k++) {
         if (npg_vec3_dotf(vert_normal, widening->normals + 3 * (size_t)near[k]) <= 0) continue; /* across */
         if (!to->count) scale = dist_sq[k] + 1e-12f;
         to->weight[to->count] = scale / (dist_sq[k] + scale);
@@ -145,11 +146,11 @@ static npg_status find_around(way_back *w)
     size_t v = m->vert_count;
     float *normals = npg_arena_take(&scratch, v, 3 * sizeof *normals);
     npg_status status = npg_neighbours_take(&near, &scratch, w->widening->shifted, w->widening->count,
-                                            m->vert_pos, v, NPG_POINTS_ASKED);
+                                            m->vert_pos, v, NPG_PATCH);
     if (!status) npg_mesh_vertex_normals(normals, m->vert_pos, v, m->faces, m->face_count);
     for (size_t i = 0; i < v && !status; i++)
-        choose_around(&w->of[i], normals + 3 * i, near.index + NPG_POINTS_ASKED * i,
-                      near.dist_sq + NPG_POINTS_ASKED * i, w->widening);
+        choose_around(&w->of[i], normals + 3 * i, near.index + NPG_PATCH * i, near.dist_sq + NPG_PATCH * i,
+                      w->widening);
     npg_arena_release(&scratch);
     return status;
 }

@@ -4,13 +4,13 @@
 #include <math.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 
 #define SWEEPS_MOST   400
 #define RELAXATION    1.7  /* beyond the mean: successive over-relaxation */
 #define SWEEPS_PUSHED 100  /* pushed and drawn, nothing settles */
 #define PUSH          0.3  /* of a cube's side */
 #define PUSHES_MOST   10   /* of a vertex, in a sweep */
-#define EMPTY_ABOVE   0.5  /* of a cube set's value */
 #define WELL_IN       0.9  /* the same: not at the border */
 #define SETTLED       1e-5 /* of the unit box: a sweep that moves nothing farther ends it */
 
@@ -64,7 +64,7 @@ static double push(const moving *m, size_t v)
 {
     double step = PUSH * (m->empty ? npg_cube_set_side(m->empty) : 0), moved = 0;
     float *x = &m->mesh->vert_pos[3 * v];
-    for (int i = 0; i < PUSHES_MOST && m->empty && npg_cube_set_value(m->empty, x) > EMPTY_ABOVE; i++) {
+    for (int i = 0; i < PUSHES_MOST && m->empty && npg_cube_set_value(m->empty, x) > NPG_MAJORITY; i++) {
         for (size_t a = 0; a < 3; a++) x[a] -= (float)step * m->normals[3 * v + a];
         moved += step;
         m->kind[v] = PUSHED;

@@ -6,6 +6,7 @@
 
 #include "align/tracking.h"
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "mesh/surface.h"
 #include "pipeline/frame_box.h"
 
@@ -84,8 +85,6 @@ typedef struct npg_reconstruct_settings {
  * NPG_MEMORY, NPG_STOPPED.  Faces that are still turned over after all mending are a warning. */
 npg_status npg_reconstruct(npg_mesh **mesh, double *invented_share, npg_worker *worker, npg_point_set *set,
                            const npg_reconstruct_settings *settings);
-
-#define NPG_POINTS_ASKED 16 /* nearest points that a vertex or a face asks; set by trial */
 
 /* Gap widening: keep parts of a body that nearly touch from being joined by the reconstruction.
  *

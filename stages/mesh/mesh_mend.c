@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "mesh/mesh_internal.h"
 
-#define ROUNDS   12 /* of smoothing folds, and of all of it */
 #define HOLE_MAX 32 /* edges of a hole that is filled       */
 
 /* ---- duplicate and degenerate faces ---- */
@@ -355,7 +355,7 @@ static npg_status unfold(npg_mesh *mesh, npg_mending *done, size_t *left)
     npg_status status = npg_arena_status(&scratch);
     *left = status ? 0 : find_flipped(is_flipped, sum, mesh);
     done->flipped += *left;
-    for (int round = 0; round < ROUNDS && *left; round++) {
+    for (int round = 0; round < NPG_ROUNDS_MOST && *left; round++) {
         smooth_round(mesh, is_flipped, sum, weight);
         *left = find_flipped(is_flipped, sum, mesh);
     }
@@ -398,7 +398,7 @@ static npg_status drop_crowded(npg_mesh **mesh, npg_mending *done, size_t *dropp
 npg_status npg_mesh_mend(npg_mesh **mesh, npg_mending *done)
 {
     memset(done, 0, sizeof *done);
-    for (int round = 0; round < ROUNDS; round++) {
+    for (int round = 0; round < NPG_ROUNDS_MOST; round++) {
         size_t dropped, left;
         NPG_TRY(drop_faces(mesh, done));
         if (!(*mesh)->face_count) break;

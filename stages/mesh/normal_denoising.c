@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 
 /* By trial (tests/bed/decisions.md, "Noise in the reference"). */
 #define WIDTH      0.6  /* of their weight's bell, in mean edges                        */
@@ -16,7 +17,7 @@ typedef struct work {
     npg_mesh *mesh; /* loan                                       */
     npg_arena arena;
     float *centres;         /* F x 3                                      */
-    npg_neighbours near;    /* F x NPG_POINTS_ASKED                                   */
+    npg_neighbours near;    /* F x NPG_PATCH                                   */
     double *targets;        /* F x 3                                      */
     double *sums, *moved;   /* V x 3 each; moved: since the start         */
     double *smooth;         /* V x 3                                      */
@@ -45,8 +46,7 @@ static void set_target(work *w, size_t f, const float *normals, double width)
 {
     double own[3], sum[3] = {0}, weights = 0, *target = w->targets + 3 * f;
     npg_face_normal(own, w->mesh->vert_pos, w->mesh->faces + 3 * f);
-    for (size_t i = NPG_POINTS_ASKED * f; i < NPG_POINTS_ASKED * (f + 1) && w->near.index[i] != UINT32_MAX;
-         i++) {
+    for (size_t i = NPG_PATCH * f; i < NPG_PATCH * (f + 1) && w->near.index[i] != UINT32_MAX; i++) {
         const float *n = normals + 3 * (size_t)w->near.index[i];
         double facing = own[0] * (double)n[0] + own[1] * (double)n[1] + own[2] * (double)n[2];
         if (!(facing > 0)) continue;
@@ -62,8 +62,7 @@ static npg_status set_targets(work *w, const float *points, const float *normals
 {
     size_t face_count = w->mesh->face_count;
     double width = WIDTH * place_centres(w);
-    NPG_TRY(npg_neighbours_take(&w->near, &w->arena, points, point_count, w->centres, face_count,
-                                NPG_POINTS_ASKED));
+    NPG_TRY(npg_neighbours_take(&w->near, &w->arena, points, point_count, w->centres, face_count, NPG_PATCH));
     for (size_t f = 0; f < face_count; f++) set_target(w, f, normals, width);
     return NPG_OK;
 }

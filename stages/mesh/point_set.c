@@ -4,12 +4,12 @@
 #include <math.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "pipeline/cost.h"
 
 #define POINTS_MAX    80000
 #define SEEN_SPACINGS 2.0 /* a place is seen when a point is nearer than this many spacings */
 #define KEY_SPACINGS  0.5 /* of the keyframe's points: all frames lie closer, but not everywhere */
-#define IN_EMPTY      0.5 /* value of the cubes above which sensors saw that a point's place is empty */
 
 /* Frames with more than POINTS_MAX give an even choice: the face budget could not hold more detail,
  * and Poisson's time goes with the points. */
@@ -32,7 +32,7 @@ static npg_status drop_empty(npg_point_set *set, npg_worker *worker)
     uint8_t *keep;
     NPG_TRY(npg_alloc(&keep, NPG_FOR_MESH, set->count));
     for (size_t i = 0; i < set->count; i++)
-        keep[i] = npg_cube_set_value(set->empty, set->points + 3 * i) <= IN_EMPTY;
+        keep[i] = npg_cube_set_value(set->empty, set->points + 3 * i) <= NPG_MAJORITY;
     size_t kept = npg_points_keep(set->points, set->normals, set->count, keep);
     npg_release(&keep);
     npg_mesh_note_count(worker, "points_in_empty_space", set->count - kept);

@@ -5,15 +5,14 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "mesh/poisson_wire.h"
 #include "outlier/normals.h"
 #include "pipeline/child.h"
 #include "pipeline/frame_box.h"
 
-#define NEIGHBOURS       9   /* the point itself and 8 more */
 #define DISAGREEMENT_MAX 0.2 /* alternating normals have 0.5, a good cloud below 0.01 */
 #define BOX_GROWTH_MAX   2.5 /* the mesh's diagonal in diagonals of the points' box */
-#define MAIN_SHARE_MIN   0.5 /* of the area, in one component */
 
 /* ---- before ---- */
 
@@ -60,8 +59,8 @@ static size_t count_against(const float *normals, const uint32_t *index, size_t 
     size_t against = 0;
     for (size_t i = 0; i < n; i++) {
         double vote = 0;
-        for (size_t k = 0; k < NEIGHBOURS; k++) {
-            uint32_t j = index[NEIGHBOURS * i + k];
+        for (size_t k = 0; k <= NPG_AROUND; k++) {
+            uint32_t j = index[(NPG_AROUND + 1) * i + k];
             if (j == UINT32_MAX || j == i) continue;
             double cosine = (double)npg_vec3_dotf(normals + 3 * i, normals + 3 * (size_t)j);
             vote += cosine * fabs(cosine);
@@ -76,7 +75,7 @@ static npg_status disagreement_of(double *share, const float *points, const floa
 {
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
     npg_neighbours near;
-    npg_status status = npg_neighbours_take(&near, &scratch, points, n, points, n, NEIGHBOURS);
+    npg_status status = npg_neighbours_take(&near, &scratch, points, n, points, n, NPG_AROUND + 1);
     if (!status) *share = (double)count_against(normals, near.index, n) / (double)n;
     npg_arena_release(&scratch);
     return status;
@@ -85,9 +84,9 @@ static npg_status disagreement_of(double *share, const float *points, const floa
 static npg_status check_points(const float *points, const float *normals, size_t point_count)
 {
     double share;
-    if (point_count < NPG_SURFACE_POINTS)
+    if (point_count < NPG_PATCH)
         return npg_error(NPG_BAD_INPUT, "%zu points are too few for a surface, it takes %d", point_count,
-                         NPG_SURFACE_POINTS);
+                         NPG_PATCH);
     NPG_TRY(check_finite(points, normals, point_count));
     NPG_TRY(check_extent(points, point_count));
     NPG_TRY(check_spread(normals, point_count));
@@ -185,7 +184,7 @@ static npg_status check_pieces(const npg_mesh *mesh)
     npg_arena_release(&scratch);
     if (status) return status;
     if (!(total > 0)) return npg_error(NPG_FAILED, "Poisson: the mesh has no area");
-    if (largest < MAIN_SHARE_MIN * total)
+    if (largest < NPG_MAJORITY * total)
         return npg_error(NPG_FAILED,
                          "Poisson: the mesh is in %zu pieces, the largest has %.0f %% of the area", count,
                          100 * largest / total);

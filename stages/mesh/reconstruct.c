@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "pipeline/clock.h"
 
 #define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
@@ -12,9 +13,6 @@
 #define SMOOTH_NEIGHBOURS 24
 #define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define GROWING_DEPTH     8    /* of the octree while the reference grows: it is to carry frames, no more */
-#define TRIM_DIST         0.15 /* in diagonals: surface farther from every point is none of the body's */
-#define LOST_TOLERATED    0.02 /* of the area, in pieces left out */
-#define UNSEEN_TOLERATED  0.02 /* of the area, before the user is told */
 #define UNSEEN_IS_A_SIDE  0.25 /* of the area: more than holes, a side that no camera saw */
 #define UNSEEN_IS_LEFT    0.05 /* the same of one that has grown: where the body goes on, out of sight */
 #define FLAT_SHARE        0.6  /* of seen_dist: surface farther than this from every point is drawn tight */
@@ -94,7 +92,7 @@ static npg_status keep_main(reconstruction *r, const char *when)
     if (pieces.kept > 1)
         npg_mesh_warn(r->worker, false, r->set->key_number,
                       "%s, the surface is in %zu pieces: holes in the points?", when, pieces.kept);
-    if (pieces.lost_share > LOST_TOLERATED)
+    if (pieces.lost_share > NPG_FEW)
         npg_mesh_warn(r->worker, false, r->set->key_number,
                       "%s, the surface is in %zu pieces: %zu with %.1f %% of the area are left out", when,
                       pieces.found, pieces.found - pieces.kept, 100 * pieces.lost_share);
@@ -116,7 +114,7 @@ static npg_status judge_unseen(reconstruction *r)
     npg_mesh_note(r->worker, "unseen_share", share);
     json_object_set_new(npg_worker_report(r->worker), "unseen",
                         json_string(r->trims_unseen ? "trimmed" : "kept"));
-    if (share > UNSEEN_TOLERATED)
+    if (share > NPG_FEW)
         npg_mesh_warn(r->worker, false, p->key_number,
                       "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
                       100 * share, p->is_fused ? "all frames" : "the keyframe",
@@ -141,18 +139,18 @@ static npg_status drop_shreds(reconstruction *r)
 static npg_status trim(reconstruction *r)
 {
     const npg_point_set *p = r->set;
-    double limit = TRIM_DIST * p->diagonal, share;
+    double limit = NPG_REMOTE_SHARE * p->diagonal, share;
     if (r->trims_unseen) limit = fmin(limit, p->seen_dist);
     NPG_TRY(npg_mesh_trim(&r->mesh, &share, p->points, p->count, limit));
     npg_mesh_note(r->worker, "trimmed_share", share);
     if (!r->mesh->face_count) return npg_error(NPG_FAILED, "no surface lies near the points");
     if (r->trims_unseen) NPG_TRY(drop_shreds(r));
     NPG_TRY(npg_mesh_unseen(&r->invented_share, r->mesh, p->points, p->count, p->seen_dist));
-    if (!r->trims_unseen && share > LOST_TOLERATED)
+    if (!r->trims_unseen && share > NPG_FEW)
         npg_mesh_warn(r->worker, false, p->key_number,
                       "%.1f %% of the reconstructed surface is farther than %g diagonals from every point "
                       "and was trimmed off",
-                      100 * share, TRIM_DIST);
+                      100 * share, NPG_REMOTE_SHARE);
     return share > 0 ? keep_main(r, "after trimming") : NPG_OK;
 }
 

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "geometry/limits.h"
 #include "pipeline/frame_box.h"
 
 #define FLAT       1e-5 /* thickness over length below which a cloud is a plane     */
@@ -166,7 +167,7 @@ static npg_status too_few(const npg_frame *frame)
                  " (%zu not finite or farther than %g from the first point, %zu duplicate, %zu isolated)",
                  c->not_finite, (double)NPG_COORDINATE_MAX, c->duplicate, c->isolated);
     return npg_error(NPG_BAD_INPUT, "%zu usable points of %zu, a surface takes %d%s", frame->point_count,
-                     c->read, NPG_SURFACE_POINTS, why);
+                     c->read, NPG_PATCH, why);
 }
 
 /* How many of the three extents are not zero, from the points' covariance without its eigenvalues (squared
@@ -176,7 +177,7 @@ static npg_status too_few(const npg_frame *frame)
 npg_status npg_clean_check(const npg_frame *frame)
 {
     double mean[3] = {0}, m[6] = {0}, n = (double)frame->point_count;
-    if (frame->point_count < NPG_SURFACE_POINTS) return too_few(frame);
+    if (frame->point_count < NPG_PATCH) return too_few(frame);
     for (size_t i = 0; i < 3 * frame->point_count; i++) mean[i % 3] += (double)frame->pos_local[i] / n;
     for (size_t i = 0; i < frame->point_count; i++) {
         double d[3];

@@ -3,16 +3,15 @@
 #include <stdlib.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "outlier/normals.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 
-#define SPACING_NEIGHBOUR 8     /* how far that one is says how dense a cloud is */
-#define SPACING_ASKED     20000 /* points at most that are asked for their neighbours */
-#define NEAR              8     /* neighbours that a plane goes through: noise ... */
-#define WIDE              24    /* ... and noise with curvature */
-#define ASKED_MAX         4000  /* points at most that are asked for their noise */
-#define FLAT_LEAST        0.1   /* of the points, that are not of thin parts */
+#define SPACING_ASKED 20000 /* points at most that are asked for their neighbours */
+#define WIDE          24   /* neighbours that a plane goes through: noise with curvature; NPG_AROUND: noise */
+#define ASKED_MAX     4000 /* points at most that are asked for their noise */
+#define FLAT_LEAST    0.1  /* of the points, that are not of thin parts */
 
 /* Of the distances to k neighbours each the farthest; and of these the median.  Overwrites the list. */
 static float median_farthest(float *dist_sq, size_t count, size_t k)
@@ -26,7 +25,7 @@ npg_status npg_cloud_spacing(double *spacing, const float *points, size_t n)
 {
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
     npg_neighbours near;
-    size_t k = SPACING_NEIGHBOUR + 1, asked = n < SPACING_ASKED ? n : SPACING_ASKED;
+    size_t k = NPG_AROUND + 1, asked = n < SPACING_ASKED ? n : SPACING_ASKED;
     float *queries = npg_arena_take(&scratch, asked, 3 * sizeof *queries);
     if (queries) npg_points_spread(queries, NULL, asked, points, NULL, n);
     npg_status status = npg_neighbours_take(&near, &scratch, points, n, queries, asked, k);
@@ -77,7 +76,7 @@ static npg_status measure_residuals(double *near, double *wide, size_t *count, s
         size_t point = n * i / asked;
         NPG_TRY(npg_kdtree_nearest(tree, index, dist_sq, points + 3 * point, 1, WIDE, 1));
         if (normals && is_thin(normals, point, index)) continue;
-        near[*count] = plane_residual(points, index, NEAR);
+        near[*count] = plane_residual(points, index, NPG_AROUND);
         wide[(*count)++] = plane_residual(points, index, WIDE);
     }
     return NPG_OK;
@@ -88,7 +87,7 @@ static double noise_of(double *near, double *wide, size_t count)
 {
     qsort(near, count, sizeof *near, npg_order_double);
     qsort(wide, count, sizeof *wide, npg_order_double);
-    double ratio = (double)(WIDE * WIDE) / (NEAR * NEAR);
+    double ratio = (double)(WIDE * WIDE) / (NPG_AROUND * NPG_AROUND);
     double noise = (ratio * near[count / 2] - wide[count / 2]) / (ratio - 1);
     return noise > 0 ? sqrt(noise) : 0;
 }

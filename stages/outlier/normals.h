@@ -8,10 +8,10 @@
 
 #include <stdbool.h>
 
+#include "geometry/limits.h"
 #include "pipeline/status.h"
 
-#define NPG_SURFACE_POINTS 16 /* of a cloud: fewer are no surface; set by trial */
-#define NPG_NEIGHBOURS     12 /* of a point, itself among them: of its side, and whether it is isolated */
+#define NPG_NEIGHBOURS 12 /* of a point, itself among them: of its side, and whether it is isolated */
 
 /* The direction in which a few points spread least. */
 void npg_normal_of(float normal[3], const float *points, size_t point_count);

@@ -4,12 +4,12 @@
 #include <math.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"
 
 /* All set by trial. */
 #define VIEW_CELLS_MAX 512 /* per side of the picture                                                */
-#define HIDDEN_CELLS   2.5 /* a point this many cell widths behind the nearest of its cell is hidden */
 #define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half    */
 #define DISTANCE       1.5 /* of a sensor that is looked for, in sizes of the cloud */
 /* First few points from few places: a cloud of many views has from all of them more that is hidden (bodies
@@ -79,7 +79,7 @@ static size_t project(double *depth, const view *v, const float *p)
 /* Share of points that are hidden behind others; nearest: room for the picture's cells. */
 static double hidden_share(const view *v, float *nearest, const float *points, size_t n)
 {
-    double depth, hidden_depth = HIDDEN_CELLS * v->cell_width;
+    double depth, hidden_depth = NPG_WITHIN * v->cell_width;
     size_t hidden = 0;
     for (size_t i = 0; i < v->cells * v->cells; i++) nearest[i] = INFINITY;
     for (size_t i = 0; i < n; i++) {

@@ -9,14 +9,13 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "ingest/ingest.h"
 #include "outlier/outlier_internal.h"
 #include "pipeline/clock.h"
 #include "pipeline/options.h"
 #include "pipeline/parallel.h"
 #include "pipeline/stage.h"
-
-#define NORMAL_NEIGHBOURS 16 /* of normals that a sensor turns */
 
 enum { NORMALS_AUTO, NORMALS_ESTIMATE, NORMALS_GIVEN };
 enum { FOR_KEY, FOR_ALL };
@@ -147,7 +146,7 @@ static npg_status make_normals(npg_frame *frame)
     NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
     frame->cleaning.normals_estimated = n;
     if (!find_sensor(frame, sensor)) return npg_normals_make(frame->normals, frame->pos_local, n);
-    NPG_TRY(npg_normals_estimate(frame->normals, frame->pos_local, n, NORMAL_NEIGHBOURS));
+    NPG_TRY(npg_normals_estimate(frame->normals, frame->pos_local, n, NPG_PATCH));
     npg_normals_face_sensor(frame->normals, &turned, frame->pos_local, n, sensor);
     return NPG_OK;
 }
@@ -159,7 +158,7 @@ static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
     float *estimate;
     double sensor[3];
     NPG_TRY(npg_alloc_array(&estimate, NPG_FOR_FRAMES, n, 3 * sizeof *estimate));
-    npg_status status = npg_normals_estimate(estimate, frame->pos_local, n, NORMAL_NEIGHBOURS);
+    npg_status status = npg_normals_estimate(estimate, frame->pos_local, n, NPG_PATCH);
     if (!status) repair_directions(frame->normals, &bad, estimate, n);
     npg_release(&estimate);
     NPG_TRY(status);

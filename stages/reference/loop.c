@@ -1,5 +1,6 @@
 /* Loop: rounds and growth. */
 #include "reference/loop.h"
+#include "geometry/limits.h"
 
 #include <math.h>
 
@@ -8,7 +9,6 @@
  * wrongly followed, and adds limbs where they are not.  In the end half, in steps, after passes that reached no
  * more frames. */
 #define EXPLAINED_FIRST 0.8
-#define EXPLAINED_LAST  0.5
 #define EXPLAINED_STEP  0.1
 
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
@@ -26,8 +26,8 @@ static void grow(npg_reference_loop *loop, int64_t unreached)
 {
     npg_brief *brief = &loop->brief;
     bool has_gained = !brief->growing_passes || unreached < loop->unreached_before;
-    bool asks_less = !has_gained && brief->explained_least > EXPLAINED_LAST + EXPLAINED_STEP / 2;
-    if (asks_less) brief->explained_least = fmax(brief->explained_least - EXPLAINED_STEP, EXPLAINED_LAST);
+    bool asks_less = !has_gained && brief->explained_least > NPG_MAJORITY + EXPLAINED_STEP / 2;
+    if (asks_less) brief->explained_least = fmax(brief->explained_least - EXPLAINED_STEP, NPG_MAJORITY);
     loop->in_vain = has_gained || asks_less ? 0 : loop->in_vain + 1;
     brief->is_growing = unreached && loop->in_vain < 2 && brief->growing_passes < GROW_PASSES;
     brief->growing_passes += unreached > 0;

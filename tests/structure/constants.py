@@ -4,7 +4,7 @@
     constants.py ROOT [--list]    how many there are in each room, and all together; --list names each
 
 What counts: a #define of one number, an enumeration of one name or a static const of one number, in a .c, .h, .cpp or
-.hpp file of a room of the method (ROOMS), or of a header that several rooms share (stages/*.h).
+.hpp file of a room of the method (ROOMS), or of a header that several rooms share (stages/*.h, limits.h).
 
 What does not, because nobody sets it by looking at a figure:
   - sizes of buffers and tables, numbers of threads, of warnings and of what is said: one of the words SIZES in the
@@ -52,7 +52,7 @@ def read_constants(root):
             continue
         parts = path.relative_to(root / "stages").parts
         room = parts[0] if len(parts) > 1 else "shared"
-        if room != "shared" and room not in ROOMS:
+        if room != "shared" and room not in ROOMS and path.name != "limits.h":
             continue
         for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1):
             match = next(filter(None, (form.match(line) for form in FORMS)), None)

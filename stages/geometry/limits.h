@@ -1,0 +1,34 @@
+/* Limits: notions that several rooms share, each one number.
+ *
+ * What is said of a surface, its points and its frames is said in their own measures (spacings, deviations,
+ * medians, sizes); how many of these is enough was set by trial, once: tests/bed/decisions.md, "Limits". */
+#ifndef NPG_GEOMETRY_LIMITS_H
+#define NPG_GEOMETRY_LIMITS_H
+
+/* Spacings of the points, deviations of their noise, usual or median distances: what lies within so many belongs
+ * to the surface, what lies farther off does not. */
+#define NPG_WITHIN 2.5
+
+/* Share of an area, or of a set, that is let pass without a word. */
+#define NPG_FEW 0.02
+
+/* More than half of those that say anything. */
+#define NPG_MAJORITY 0.5
+
+/* Of a diagonal: detail smaller than that is not told from noise; parts of one body without points between lie
+ * no farther apart; and what is farther from every point is none of the body's. */
+#define NPG_DETAIL_SHARE 0.015
+#define NPG_NEARBY_SHARE 0.1
+#define NPG_REMOTE_SHARE 0.15
+
+/* Points around one that say how dense and noisy a cloud is there, and those that are a piece of surface. */
+#define NPG_AROUND 8
+#define NPG_PATCH  16
+
+/* Frames that say the same: one alone may be wrong. */
+#define NPG_CONFIRMED 2
+
+/* Of loops that end by themselves. */
+#define NPG_ROUNDS_MOST 12
+
+#endif
