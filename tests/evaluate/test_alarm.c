@@ -150,14 +150,14 @@ static void what_creeps_raises_none(void **state)
 }
 
 /* Whether an alarm is raised by frames with these figures from index 30 on. */
-static bool is_raised_by(double far, double bare, double torn, double fit)
+static bool is_raised_by(double far, double unsupported, double stretched, double fit)
 {
     npg_alarm *alarm;
     assert_int_equal(npg_alarm_open(&alarm, 0), NPG_OK);
     for (int64_t i = 0; i < FRAMES; i++) {
         npg_frame frame = frame_of(i, NPG_MISFIT_FAR, i < 30 ? 0 : far);
-        frame.figures.misfits[NPG_MISFIT_UNSUPPORTED].share = i < 30 ? 0 : bare;
-        frame.figures.misfits[NPG_MISFIT_STRETCHED].share = i < 30 ? 0 : torn;
+        frame.figures.misfits[NPG_MISFIT_UNSUPPORTED].share = i < 30 ? 0 : unsupported;
+        frame.figures.misfits[NPG_MISFIT_STRETCHED].share = i < 30 ? 0 : stretched;
         frame.figures.point_dist_median = i < 30 ? 0.002 : fit;
         assert_int_equal(npg_alarm_add(alarm, &frame), NPG_OK);
     }
@@ -311,24 +311,25 @@ static void what_lies_beyond_a_border_is_not_far(void **state)
 }
 
 /* The right half has gone off its points; then it is stretched as well. */
-static void bare_and_torn_surface_is_found(void **state)
+static void unsupported_and_stretched_surface_is_found(void **state)
 {
     sheet s;
     npg_misfit m[NPG_MISFITS];
-    double bare = 0;
+    double unsupported = 0;
     (void)state;
     open_sheet(&s, false);
     for (size_t v = 0; v < VERTS; v++) {
         bool is_right = v % (SIDE + 1) > SIDE / 2;
         s.vert_dist_sq[v] = is_right ? 0.09f : 0;
-        bare += is_right ? s.areas[v] : 0;
+        unsupported += is_right ? s.areas[v] : 0;
     }
     find(m, &s);
-    assert_true(fabs(m[NPG_MISFIT_UNSUPPORTED].share - bare) < 1e-9 && m[NPG_MISFIT_STRETCHED].share == 0);
+    assert_true(fabs(m[NPG_MISFIT_UNSUPPORTED].share - unsupported) < 1e-9 &&
+                m[NPG_MISFIT_STRETCHED].share == 0);
     for (size_t v = 0; v < VERTS; v++)
         if (v % (SIDE + 1) > SIDE / 2) s.vert_unit[3 * v] = 0.5f + 3 * (s.vert_unit[3 * v] - 0.5f);
     find(m, &s);
-    assert_true(fabs(m[NPG_MISFIT_STRETCHED].share - bare) < 1e-9);
+    assert_true(fabs(m[NPG_MISFIT_STRETCHED].share - unsupported) < 1e-9);
     assert_true(m[NPG_MISFIT_STRETCHED].at[0] > 1);
     close_sheet(&s);
 }
@@ -358,7 +359,29 @@ static void what_no_sensor_has_in_sight_is_not_missing(void **state)
     close_sheet(&s);
 }
 
-static void what_sampling_or_a_border_explains_is_not_bare(void **state)
+/* The right half was closed where the reference had no points: it may go anywhere. */
+static void what_no_point_of_the_reference_supports_is_not_missing(void **state)
+{
+    sheet s;
+    npg_misfit m[NPG_MISFITS];
+    (void)state;
+    open_sheet(&s, false);
+    assert_int_equal(npg_alloc_array(&s.mesh->vert_unseen, NPG_FOR_MESH, VERTS, 1), NPG_OK);
+    for (size_t v = 0; v < VERTS; v++) {
+        s.mesh->vert_unseen[v] = v % (SIDE + 1) > SIDE / 2;
+        if (!s.mesh->vert_unseen[v]) continue;
+        s.vert_dist_sq[v] = 0.09f;
+        s.vert_unit[3 * v] = 0.5f + 3 * (s.vert_unit[3 * v] - 0.5f);
+    }
+    find(m, &s);
+    for (int k = 0; k < NPG_MISFITS; k++) assert_true(m[k].share == 0);
+    memset(s.mesh->vert_unseen, 0, VERTS);
+    find(m, &s);
+    assert_true(m[NPG_MISFIT_UNSUPPORTED].share > 0.4 && m[NPG_MISFIT_STRETCHED].share > 0.4);
+    close_sheet(&s);
+}
+
+static void what_sampling_or_a_border_explains_is_not_unsupported(void **state)
 {
     sheet s;
     npg_misfit m[NPG_MISFITS];
@@ -377,7 +400,7 @@ static void what_sampling_or_a_border_explains_is_not_bare(void **state)
 }
 
 /* Two sheets in one place: the second has no points of its own, then a fair share. */
-static void a_part_without_points_of_its_own_is_deserted(void **state)
+static void a_part_without_points_of_its_own_is_vacated(void **state)
 {
     enum { ROW = SIDE + 1, HALF = SIDE / 2 * ROW };
     sheet s;
@@ -416,9 +439,10 @@ int main(void)
         cmocka_unit_test(frames_without_figures_are_passed_over),
         cmocka_unit_test(points_in_a_cluster_far_off_are_found_and_scattered_ones_not),
         cmocka_unit_test(what_lies_beyond_a_border_is_not_far),
-        cmocka_unit_test(bare_and_torn_surface_is_found),
+        cmocka_unit_test(unsupported_and_stretched_surface_is_found),
         cmocka_unit_test(what_no_sensor_has_in_sight_is_not_missing),
-        cmocka_unit_test(what_sampling_or_a_border_explains_is_not_bare),
-        cmocka_unit_test(a_part_without_points_of_its_own_is_deserted)};
+        cmocka_unit_test(what_no_point_of_the_reference_supports_is_not_missing),
+        cmocka_unit_test(what_sampling_or_a_border_explains_is_not_unsupported),
+        cmocka_unit_test(a_part_without_points_of_its_own_is_vacated)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -79,7 +79,7 @@ static void what_has_no_border_stays(void **state)
     expect_unchanged(ball_mesh(12, 24));
 }
 
-static void what_is_fringe_alone_stays(void **state)
+static void what_is_border_alone_stays(void **state)
 {
     (void)state;
     expect_unchanged(sheet_with_strip());
@@ -105,7 +105,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_strip_goes_and_the_sheet_stays),
         cmocka_unit_test(what_has_no_border_stays),
-        cmocka_unit_test(what_is_fringe_alone_stays),
+        cmocka_unit_test(what_is_border_alone_stays),
         cmocka_unit_test(without_memory_the_mesh_stays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
