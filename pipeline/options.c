@@ -97,7 +97,7 @@ static int which_flag(const char *text)
 
 static npg_status check_number(const npg_option *option, const char *text)
 {
-    double value = NAN;
+    double value = (double)NAN;
     const char *end = npg_number_parse(text, text + strlen(text), &value);
     bool whole = option->type != NPG_OPTION_INT || (value == floor(value) && !strpbrk(text, ".eE"));
     if (!end || *end || !isfinite(value) || !whole)
