@@ -230,8 +230,7 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     s->usual = (s->usual * (double)s->frames + median) / (double)(s->frames + 1);
     s->frames++;
     NPG_TRY(look_around(worker, c, frame));
-    return add_points(s, c, frame->index, NPG_WITHIN * median,
-                      fmax(NPG_WITHIN * s->spacing, NPG_WITHIN * median));
+    return add_points(s, c, frame->index, NPG_WITHIN * median, NPG_WITHIN * fmax(s->spacing, median));
 }
 
 static npg_status gather_frame(npg_worker *worker, const npg_frame *frame)
