@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "align/tracking.h"
 #include "geometry/geometry.h"
 #include "kernels/mlp.h"
 #include "kernels/motion.h"
@@ -15,6 +14,7 @@
 #include "pipeline/order.h"
 #include "tools/cli.h"
 #include "tools/synth/synth.h"
+#include "track/track.h"
 
 typedef struct settings {
     int64_t vertices, points, frames, repeat;

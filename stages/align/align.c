@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "align/align_internal.h"
-#include "align/tracking.h"
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
 #include "job/job.h"

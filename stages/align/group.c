@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "pipeline/memory.h"
-
 /* ---- sides ---- */
 
 /* A multiple of doubles: one side lies behind the other. */

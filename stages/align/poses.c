@@ -4,9 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "align/tracking.h"
-#include "geometry/geometry.h"
-
 static npg_status alloc_map(npg_pose_map *map, size_t count, size_t old_count)
 {
     map->count = count;

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "align/tracking.h"
 #include "pipeline/order.h"
 
 /* Set by trial on a fast gallop: tests/bed/decisions.md, lost frames. */

@@ -4,11 +4,11 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "align/tracking.h"
 #include "evaluate/evaluate_internal.h"
 #include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
+#include "track/track.h"
 
 /* ---- the shape against that of the reference ---- */
 

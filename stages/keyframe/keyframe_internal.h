@@ -4,13 +4,13 @@
 
 #include <pthread.h>
 
-#include "align/tracking.h"
 #include "mesh/surface.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/stage.h"
 #include "pipeline/store.h"
 #include "reference/reference.h"
+#include "track/track.h"
 
 /* Likeness: how near a user's own mesh is to a frame's points, where it was put.
  *

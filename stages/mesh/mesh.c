@@ -2,7 +2,6 @@
  * mesh instead, puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
 
-#include "align/tracking.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "mesh/mesh_internal.h"
@@ -10,6 +9,7 @@
 #include "pipeline/cost.h"
 #include "pipeline/stage.h"
 #include "reference/reference.h"
+#include "track/track.h"
 
 /* Limits of the reconstruction's process: one that hangs, or that strange points have blown up, ends. */
 #define POISSON_TIME_S     600

@@ -4,11 +4,11 @@
 
 #include <jansson.h>
 
-#include "align/tracking.h"
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
 #include "mesh/surface.h"
 #include "pipeline/frame_box.h"
+#include "track/track.h"
 
 /* Report: what is said while the reference is made, as figures of the stage's report and lines of the log.
  *

@@ -3,8 +3,8 @@
 
 #include <stdio.h>
 
-#include "align/tracking.h"
 #include "geometry/geometry.h"
+#include "track/track.h"
 
 npg_status npg_mesh_mark_unseen(npg_mesh *mesh, const float *points, size_t point_count, double dist_max)
 {

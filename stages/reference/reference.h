@@ -2,7 +2,7 @@
 #ifndef NPG_REFERENCE_H
 #define NPG_REFERENCE_H
 
-#include "align/tracking.h"
+#include "track/track.h"
 
 /* Judge: what a surface is worth as the reference, by points that had no part in it.
  *

@@ -1,11 +1,9 @@
 /* Rigid ICP: trimmed iterated closest points between two looks. */
-#include "align/align_internal.h"
+#include "track/track.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/geometry.h"
-#include "pipeline/memory.h"
 #include "pipeline/order.h"
 
 #define ROUNDS 12

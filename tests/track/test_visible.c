@@ -10,8 +10,8 @@
 
 #include <cmocka.h>
 
-#include "align/tracking.h"
 #include "tests/support/ball_mesh.h"
+#include "track/track.h"
 
 #define RADIUS 0.5f /* of the ball */
 

@@ -1,11 +1,10 @@
 /* Graph: choosing nodes and weights along the surface. */
-#include "align/tracking.h"
+#include "track/track.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "geometry/geometry.h"
 #include "pipeline/order.h"
 #include "pipeline/parallel.h"
 

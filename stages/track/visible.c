@@ -1,5 +1,5 @@
 /* Visible: rays from the surface to the sensors. */
-#include "align/tracking.h"
+#include "track/track.h"
 
 #include <math.h>
 #include <string.h>

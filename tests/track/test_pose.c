@@ -9,8 +9,8 @@
 
 #include <cmocka.h>
 
-#include "align/tracking.h"
 #include "tests/support/ball_mesh.h"
+#include "track/track.h"
 
 static void turn_about_z(double *pose, double angle)
 {

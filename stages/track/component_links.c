@@ -1,5 +1,5 @@
 /* Component links: pieces join the first node's, nearest first. */
-#include "align/align_internal.h"
+#include "track/track_internal.h"
 
 #include <math.h>
 #include <stdlib.h>

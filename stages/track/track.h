@@ -1,6 +1,6 @@
-/* Align: following a surface into frames. What other rooms may call; align_internal.h has the rest. */
-#ifndef NPG_ALIGN_TRACKING_H
-#define NPG_ALIGN_TRACKING_H
+/* Track: a surface into one frame, from a pose nearby. */
+#ifndef NPG_TRACK_H
+#define NPG_TRACK_H
 
 #include "geometry/geometry.h"
 #include "pipeline/chunk.h"
@@ -175,15 +175,22 @@ void npg_prior_count(const npg_occlusion_prior *prior, float *since, const float
  *
  * Gauss-Newton on the nodes of a deformation graph (graph.c):
  *
- *     E = mean_p rho(|x(c_p) - p|_W^2) + mean_s rho(|x(s) - p_s|_W^2)
- *         + stiffness * sum over edges |R_j e_jk + g_j + t_j - (g_k + t_k)|^2 / radius^2 / edges
+ *     E = mean_p rho(|x(c_p) - p|) |x(c_p) - p|_W^2 + 1/2 mean_s rho(|x(s) - p_s|) |x(s) - p_s|_W^2
+ *         + stiff / edges * sum over edges, both ways, h_jk |R_j e_jk + g_j + t_j - (g_k + t_k)|^2
+ *     |y|_W^2 = (1 - along) (n . y)^2 + along |y|^2               n: the surface's normal there
+ *     stiff = stiffness 10^(1 - a) (1 + (d / 0.003 L)^2) (before one sensor: 20)
+ *     rho(r) = (1 + r^2 / w^2)^-2                                  Geman and McClure, held during a step
+ *     w = max(0.08^(1 - a) 0.01^a L, 2.5 d)
  *
  * c_p: the point of the deformed surface closest to the target point p; p_s: the target point closest to the
- * sample s; W measures distances along the surface normal fully and along the surface by a small share; rho
- * is the robust weight of Geman and McClure, whose width shrinks step by step; e_jk: the edge g_k - g_j at
- * rest, or as it is held where no sensor sees it (occlusion_prior.c).  Few unknowns, second order: it reaches what
- * gradient descent needs hundreds of steps for; the joint fit then needs to find only what the graph can't
- * express.
+ * sample s; e_jk: the edge g_k - g_j at rest, or as it is held where no sensor sees it, and h_jk what it counts
+ * (1 but for links, occlusion_prior.c).  a grows from 0 to 1 over the first 2/3 of the steps; another effort
+ * has other numbers for 10 and 0.08.  d: mean distance of the points from the surface in the step before, so the
+ * noisier they are the more of them must agree before the surface gives way.  L: longest side of the reference
+ * against that of the box of all frames.  One sensor leaves half of the body to the edges.  Samples without a
+ * point within 3 w have no part; those where a sensor saw that nothing is go to the nearest point however
+ * far that is, and w is that far.  Few unknowns, second order: it reaches what gradient descent needs hundreds of
+ * steps for; the joint fit then needs to find only what the graph can't express.
  *
  * Not in the paper: it replaces the slow way from the identity (paper, "Deformation Loss", confidence). */
 
@@ -251,6 +258,34 @@ void npg_tracker_since(const npg_tracker *tracker, float *since, const float *be
 
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);
+
+/* Rigid ICP: how a body stands in one frame against another, as far as it moved as a whole.
+ *
+ * Motion recurs, but seldom in place: who walks comes back to a pose lengths away, who turns comes back to it
+ * facing elsewhere.  So two frames are compared, and one is started from the pose of the other, after the
+ * rigid motion that brings their points together.
+ *
+ * Based on: Besl and McKay, A method for registration of 3-D shapes, 1992 (iterated closest points), and
+ * Chetverikov et al., The trimmed iterative closest point algorithm, 2002: the pairs that lie farthest apart,
+ * of limbs that moved on their own, are left out. */
+
+#define NPG_LOOK_POINTS 500 /* of a frame, at most */
+
+/* A few points of a frame. */
+typedef struct npg_look {
+    float *points; /* N x 3; owned */
+    size_t count;  /* N            */
+    npg_kdtree *tree;
+} npg_look;
+
+/* Spread over the points that are given, one at least.  NPG_MEMORY: what was got is to be closed. */
+npg_status npg_look_open(npg_look *look, const float *points, size_t point_count);
+void npg_look_close(npg_look *look);
+
+/* motion: takes `from` onto `to`, found from where their middles meet and from `guess`; *unlike: what is left
+ * between them then, the mean of squared distances, both ways.  NPG_MEMORY. */
+npg_status npg_rigid_icp(npg_rigid *motion, double *unlike, const npg_look *from, const npg_look *to,
+                         const npg_rigid *guess);
 
 /* Candidate clouds: the frames of the choosing pass, thinned, and how a surface made from one of them fares in
  * the others: it is followed from frame to frame by the coarse tracker, outward in both directions. */

@@ -1,11 +1,9 @@
 /* Candidate clouds: thinned frames, and following a surface through them. */
-#include "align/tracking.h"
+#include "track/track.h"
 
 #include <math.h>
 #include <string.h>
 #include <xxhash.h>
-
-#include "geometry/geometry.h"
 
 #define FLIPPED_MOST                                                                                         \
     0.1 /* share of given normals on the wrong side, beyond which those of other frames are not used */

@@ -1,14 +1,13 @@
 /* Tracker: correspondences and Gauss-Newton steps on the deformation graph. */
-#include "align/tracking.h"
+#include "track/track.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/align_internal.h"
-#include "geometry/geometry.h"
 #include "geometry/limits.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/parallel.h"
+#include "track/track_internal.h"
 
 #define STIFF_START 10.0 /* times the final stiffness at the first step */
 /* For a reference that fills the box of all frames; one that travels through it is smaller,
@@ -511,8 +510,7 @@ static npg_status gather(step *s)
     return npg_parallel(add_terms, s, NPG_BLOCK_PARTS);
 }
 
-/* How far a fit has come, 0..1 before the last steps; the noisier the points, the more of them must agree
- * before the surface gives way. */
+/* How far a fit has come, 0..1 before the last steps. */
 static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_effort *effort)
 {
     int last = effort->steps - 1;

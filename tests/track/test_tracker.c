@@ -9,9 +9,9 @@
 
 #include <cmocka.h>
 
-#include "align/tracking.h"
 #include "geometry/geometry.h"
 #include "tests/support/ball_mesh.h"
+#include "track/track.h"
 
 static void thin_meshes_are_made_of_the_whole_one_s_vertices(void **state)
 {

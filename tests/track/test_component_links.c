@@ -7,10 +7,10 @@
 
 #include <cmocka.h>
 
-#include "align/align_internal.h"
 #include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
+#include "track/track_internal.h"
 
 enum { NODES = 9 };
 

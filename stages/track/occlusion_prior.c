@@ -1,11 +1,11 @@
 /* Occlusion prior: edges in the frame of their first end. */
-#include "align/tracking.h"
+#include "track/track.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "align/align_internal.h"
 #include "pipeline/order.h"
+#include "track/track_internal.h"
 
 /* What is hidden for long drifts by what each frame adds, so a small part of each edge stays at rest; more of
  * it where several sensors leave little hidden, between parts that are seen.  By trial,

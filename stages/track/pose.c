@@ -1,10 +1,7 @@
 /* Pose: products of the nodes' rotations. */
-#include "align/tracking.h"
+#include "track/track.h"
 
 #include <math.h>
-
-#include "geometry/geometry.h"
-#include "pipeline/memory.h"
 
 void npg_pose_straighten(double m[9])
 {

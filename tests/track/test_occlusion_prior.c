@@ -10,8 +10,8 @@
 
 #include <cmocka.h>
 
-#include "align/tracking.h"
 #include "tests/support/ball_mesh.h"
+#include "track/track.h"
 
 #define TWIST 0.6 /* of the lower half against the upper one, radians */
 

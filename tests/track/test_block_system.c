@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "align/align_internal.h"
+#include "track/track_internal.h"
 
 enum { NODES = 40, SIZE = 6 * NODES, PAIRS_MAX = NODES * (NODES - 1) / 2, TERMS = 600 };
 

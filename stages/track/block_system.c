@@ -3,7 +3,7 @@
  * Gathered in double, one triangle.  Solved in single: what a step needs is a direction, and half the bytes
  * are half the time.  For that both triangles are laid out row by row, each block by columns of eight lanes
  * (two of them zero), and so are the vectors. */
-#include "align/align_internal.h"
+#include "track/track_internal.h"
 
 #include <math.h>
 #include <string.h>

@@ -9,8 +9,8 @@
 
 #include <cmocka.h>
 
-#include "align/align_internal.h"
 #include "pipeline/random.h"
+#include "track/track.h"
 
 enum { POINTS = 2000 };
 
