@@ -7,7 +7,7 @@
 #include <stddef.h>
 
 #include "geometry/geometry.h"
-#include "outlier/normals.h"
+#include "outlier/outlier.h"
 #include "pipeline/chunk.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"

@@ -167,3 +167,17 @@ npg_status npg_isolated_drop(npg_frame *const *frames, size_t count, int neighbo
     npg_arena_release(&scratch);
     return status;
 }
+
+npg_status npg_frame_clean(npg_frame *frame, uint8_t **keep, size_t point_max, double ratio)
+{
+    double side;
+    *keep = NULL;
+    NPG_TRY(npg_clean_finite(frame));
+    NPG_TRY(npg_clean_duplicates(frame));
+    NPG_TRY(npg_clean_cap(frame, &side, point_max));
+    if (!frame->point_count) return NPG_OK;
+    NPG_TRY(npg_alloc(keep, NPG_FOR_FRAMES, frame->point_count));
+    memset(*keep, 1, frame->point_count);
+    if (!(ratio > 0)) return NPG_OK;
+    return npg_find_isolated(*keep, frame->pos_local, frame->point_count, NPG_NEIGHBOURS, ratio, 0);
+}

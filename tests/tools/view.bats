@@ -33,6 +33,31 @@ setup() {
     [ "$(stat -c %s few.html)" -lt "$(stat -c %s made/view.html)" ]
 }
 
+@test "points that the run drops are told apart, and nothing is measured from them" {
+    cp -r made spoiled
+    python3 - spoiled capture/points/frame_0000.ply <<'END'
+import json, pathlib, struct, sys
+run, points = map(pathlib.Path, sys.argv[1:])
+bytes_ = points.read_bytes()
+head = bytes_[:bytes_.index(b"end_header\n") + 11]
+stride = (len(bytes_) - len(head)) // 600
+rows = [struct.unpack_from("<3f", bytes_, len(head) + stride * i) for i in range(600)] + [(0, 5, 0), (4, 0, 0), (0, 0, -3)]
+(run / "spoiled.xyz").write_text("".join("%.9g %.9g %.9g\n" % row for row in rows))
+lines = (run / "frames.jsonl").read_text().splitlines()
+first = json.loads(lines[0])
+first["source"] = str(run / "spoiled.xyz")
+(run / "frames.jsonl").write_text("\n".join([json.dumps(first)] + lines[1:]) + "\n")
+END
+    "$NEUPIG" view spoiled
+    node "$check" spoiled/view.html spoiled 1 600 | tee said
+    grep -q ' 600 points, .* 3 dropped$' said
+    # a run that was told to keep them has dropped none
+    sed -i 's/"bars.cover"/"outliers": "no", "bars.cover"/' spoiled/done.json
+    "$NEUPIG" view spoiled
+    node "$check" spoiled/view.html spoiled 1 603 | tee said
+    grep -q ' 603 points, .* 0 dropped$' said
+}
+
 @test "two results in one page, with the frames of both" {
     python3 "$BATS_TEST_DIRNAME/view/made_result.py" capture other 12
     "$NEUPIG" view made other

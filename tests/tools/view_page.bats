@@ -38,6 +38,14 @@ in_browser() { # TEST ARGUMENTS...
     in_browser plays made/view.html
 }
 
+@test "mesh, opacity, points alone, a distance, the picture as a file, frame and camera in the address" {
+    in_browser tools made/view.html
+}
+
+@test "while a page loads it says how much is there, and its buttons are dead" {
+    in_browser loading made/view.html
+}
+
 @test "a known frame looks as it did" {
     in_browser picture made/view.html "$here/known_frame.png"
 }

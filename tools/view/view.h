@@ -137,12 +137,13 @@ json_t *npg_view_result_json(const npg_view_result *result);
  *
  *     f64 origin[3], step        the grid of its positions; points lie on one NPG_VIEW_POINT_STEP times as
  *     wide u32 frames, bytes of positions, of errors, of points
- *     u32 points of each frame
+ *     u32 points of each frame, then how many of each, its last ones, the run had dropped
  *     positions                  per frame x of all vertices, then y, z: of the first frame, of later ones
  *                                the change since the one before; predicted and packed
- *     errors                     per frame 0 to 255, per vertex the distance to the nearest point:
- *                                d = (value / 255)^2 x NPG_VIEW_ERROR_MAX diagonals; predicted and packed.
- *                                255 is that or more, all of a frame is 0 without points
+ *     errors                     per frame and vertex 2 e + c, predicted and packed.  c: whether a point is
+ *                                near (bars.cover).  e: how far points lie outside the surface there,
+ *                                d = ((e - 128) / 127)^2 x NPG_VIEW_ERROR_MAX diagonals, inside it below
+ *                                128; 1 and 255 are that or more, 0 is not known
  *     points                     per frame x, then y, z, in the order of a space-filling curve, each as the
  *                                change since the point before; packed
  *
@@ -168,8 +169,10 @@ typedef struct npg_view_frames {
     const npg_view_part *part; /* loan */
     size_t point_limit;        /* points of a frame that are shown; all are measured from */
     float *vert_pos;           /* V x 3 of the frame at hand                              */
-    float *points, *some;      /* N x 3, and those shown                                  */
-    size_t point_count, point_capacity, some_capacity;
+    float *points, *some;      /* N x 3, those that were dropped last, and those shown    */
+    size_t point_count, dropped_count, point_capacity, some_capacity;
+    double noise_sum; /* of noise_count frames, in the meshes' unit */
+    size_t noise_count;
     int32_t *seen;         /* V                                                       */
     size_t without_points; /* frames whose points could not be read                   */
     size_t with_points;
@@ -190,14 +193,18 @@ npg_status npg_view_part_block(npg_bytes *out, npg_view_frames *frames);
 /* Fill frames->vert_pos, relative to the part's origin: from the mesh's file; without one it stays. */
 npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *frame);
 
-/* Fill frames->points, in the coordinates of the meshes and relative to the part's origin.  None where the
+/* Fill frames->points and its counts (point_count: of those kept), in the coordinates of the meshes and relative to the part's origin.  None where the
  * file can't be read: noted in `frames`, no failure.  NPG_MEMORY. */
 npg_status npg_view_read_points(npg_view_frames *frames, const npg_view_frame *frame);
 
-/* errors (V, 0 to 255) of the frame at hand, and frames->seen. */
+/* errors (V, as in a block) of the frame at hand, and frames->seen: the signed distances of the points to the
+ * surface, each spread over the corners of its face by its weights there and then to their neighbours, as
+ * means; a vertex that none fell to takes the mean of its neighbours, if a point is as near as it then should
+ * be. */
 npg_status npg_view_measure(npg_view_frames *frames, int32_t *errors);
 
-/* Copy at most frames->point_limit of the points to frames->some, in the order of a space-filling curve. */
-npg_status npg_view_choose_points(npg_view_frames *frames, size_t *count);
+/* Copy at most frames->point_limit of the points to frames->some, in the order of a space-filling curve: of
+ * those kept, then of those dropped. */
+npg_status npg_view_choose_points(npg_view_frames *frames, size_t *count, size_t *dropped);
 
 #endif

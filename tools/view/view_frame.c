@@ -45,25 +45,26 @@ typedef struct group {
     int32_t *errors;  /* count x V     */
     float *points;    /* of all frames */
     size_t point_total, point_capacity;
-    uint32_t *point_counts; /* count */
+    uint32_t *point_counts; /* 2 count: all, then those that were dropped */
     npg_view_grid grid;
 } group;
 
 static npg_status gather_frame(group *g, size_t i, const npg_view_frame *frame)
 {
     npg_view_frames *frames = g->frames;
-    size_t shown;
+    size_t shown, dropped;
     NPG_TRY(npg_view_read_mesh(frames, frame));
     memcpy(g->positions + 3 * g->v * i, frames->vert_pos, 3 * g->v * sizeof *g->positions);
-    frames->point_count = 0;
+    frames->point_count = frames->dropped_count = 0;
     if (frame->file || frame->source) NPG_TRY(npg_view_read_points(frames, frame));
     if (frame->file) NPG_TRY(npg_view_measure(frames, g->errors + g->v * i));
-    NPG_TRY(npg_view_choose_points(frames, &shown));
+    NPG_TRY(npg_view_choose_points(frames, &shown, &dropped));
     NPG_TRY(npg_arena_grow(&g->arena, &g->points, &g->point_capacity, g->point_total + shown,
                            3 * sizeof *g->points));
     if (shown) memcpy(g->points + 3 * g->point_total, frames->some, 3 * shown * sizeof *g->points);
     g->point_total += shown;
     g->point_counts[i] = (uint32_t)shown;
+    g->point_counts[g->count + i] = (uint32_t)dropped;
     return NPG_OK;
 }
 
@@ -73,7 +74,7 @@ static npg_status gather(group *g, size_t first)
     double shortest = INFINITY;
     g->positions = npg_arena_take(&g->arena, g->count * g->v, 3 * sizeof *g->positions);
     g->errors = npg_arena_take(&g->arena, g->count * g->v, sizeof *g->errors);
-    g->point_counts = npg_arena_take(&g->arena, g->count, sizeof *g->point_counts);
+    g->point_counts = npg_arena_take(&g->arena, 2 * g->count, sizeof *g->point_counts);
     NPG_TRY(npg_arena_status(&g->arena));
     for (size_t i = 0; i < g->count; i++) {
         npg_bounds bounds = npg_bounds_empty();
@@ -169,7 +170,7 @@ static npg_status pack_group(npg_bytes *out, group *g)
     NPG_TRY(add_grid(out, &g->grid));
     size_t at = out->size + 4;
     NPG_TRY(npg_bytes_add(out, head, sizeof head));
-    NPG_TRY(npg_bytes_add(out, g->point_counts, g->count * sizeof *g->point_counts));
+    NPG_TRY(npg_bytes_add(out, g->point_counts, 2 * g->count * sizeof *g->point_counts));
     NPG_TRY(pack_positions(out, &sizes[0], &g->arena, &part->links, &g->grid, g->positions, g->count));
     NPG_TRY(pack_rows(out, &sizes[1], &g->arena, &part->links, g->errors, g->count));
     NPG_TRY(pack_points(out, &sizes[2], g));

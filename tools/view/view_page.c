@@ -1,6 +1,7 @@
 /* Page: one HTML file that needs no other, of one result or of two side by side. */
 #include "tools/view/view.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -84,15 +85,22 @@ static void write_base64(npg_file *file, const uint8_t *bytes, size_t size)
     }
 }
 
-static void write_block(npg_file *file, npg_bytes *block, const char *id)
+/* share: of the page's frames, about, that are there with this block; what the page says while it loads. */
+static void write_block(npg_file *file, npg_bytes *block, const char *id, double share)
 {
-    npg_file_print(file, "<script type=\"text/plain\" id=\"%s\">", id);
+    npg_file_print(file, "<script type=\"text/plain\" id=\"%s\" data-share=\"%.3f\">", id, share);
     write_base64(file, block->data, block->size);
     npg_file_print(file, "</script>\n");
     block->size = 0;
 }
 
-static npg_status write_groups(npg_file *file, npg_view_frames *frames, const char *part_id)
+/* A part's name in the page, and how much of the page is there before and with it. */
+typedef struct part_place {
+    char id[48];
+    double before, with;
+} part_place;
+
+static npg_status write_groups(npg_file *file, npg_view_frames *frames, const part_place *place)
 {
     const npg_view_part *part = frames->part;
     npg_bytes block = {0};
@@ -101,26 +109,30 @@ static npg_status write_groups(npg_file *file, npg_view_frames *frames, const ch
     for (size_t first = 0; first < part->count && !status; first += part->group) {
         size_t left = part->count - first;
         status = npg_view_group_block(&block, frames, first, left < part->group ? left : part->group);
-        snprintf(id, sizeof id, "%s-%zu", part_id, first / part->group);
-        if (!status) write_block(file, &block, id);
+        snprintf(id, sizeof id, "%s-%zu", place->id, first / part->group);
+        double share = fmin(1, (double)(first + part->group) / (double)part->count);
+        if (!status) write_block(file, &block, id, place->before + share * (place->with - place->before));
     }
     if (!status) status = npg_view_part_block(&block, frames);
-    if (!status) write_block(file, &block, part_id);
+    if (!status) write_block(file, &block, place->id, place->with);
     npg_release(&block.data);
     return status;
 }
 
 static npg_status write_part(npg_file *file, npg_view_facts *facts, json_t *json, const npg_view_part *part,
-                             const char *id, size_t point_limit)
+                             const part_place *place, size_t point_limit)
 {
     npg_view_frames frames;
     NPG_TRY(npg_view_frames_open(&frames, part, point_limit));
-    npg_status status = write_groups(file, &frames, id);
+    npg_status status = write_groups(file, &frames, place);
     if (frames.without_points && !facts->without_points) memcpy(facts->why, frames.why, sizeof facts->why);
     facts->without_points += frames.without_points;
     facts->frames += part->count;
     if (part->reference->vert_count > facts->vertices) facts->vertices = part->reference->vert_count;
     json_object_set_new(json, "with_points", json_integer((json_int_t)frames.with_points));
+    if (frames.noise_count)
+        json_object_set_new(json, "noise",
+                            json_real(frames.noise_sum / (double)frames.noise_count / part->diagonal));
     if (frames.without_points) json_object_set_new(json, "no_points", npg_json_text(frames.why));
     npg_arena_release(&frames.arena);
     return status;
@@ -136,10 +148,12 @@ static npg_status write_result(npg_file *file, npg_view_facts *facts, json_t *re
     if (!status && order->every > 1)
         json_object_set_new(json, "every", json_integer((json_int_t)order->every));
     for (size_t i = 0; i < result.part_count && !status; i++) {
-        char id[48];
+        double all = (double)(order->path_count * result.part_count);
+        double before = (double)(place * result.part_count + i) / all;
+        part_place at = {.before = before, .with = before + 1 / all};
         if (!result.parts[i].reference) continue; /* not there yet */
-        snprintf(id, sizeof id, "data-%zu-%zu", place, i);
-        status = write_part(file, facts, json_array_get(parts, i), &result.parts[i], id, order->point_limit);
+        snprintf(at.id, sizeof at.id, "data-%zu-%zu", place, i);
+        status = write_part(file, facts, json_array_get(parts, i), &result.parts[i], &at, order->point_limit);
     }
     if (!status)
         json_array_append_new(results, json);

@@ -5,12 +5,15 @@
 //     figures PAGE RUN        curve and marks are those of frames.jsonl, decoded positions those of the meshes
 //     looks PAGE              each colour mode and shading changes the picture; points, views, fit, themes, a vertex
 //     plays PAGE              play, pause, scrub, step, speed, loop, by buttons, mouse and keys
+//     tools PAGE              mesh, opacity, points alone, a distance, PNG, the address, full screen
+//     loading PAGE            half of the page has come: progress, and dead buttons; then the rest
 //     picture PAGE STORED     a known frame looks as it did (WRITE=1 in the environment stores it)
 //     compare PAGE            two results on one time line
 //     phone PAGE              at the width of a phone
 //     names PAGE              hostile names are shown as text
 //     live PAGE RUN PID       the page of a run at work shows more and more of it, until process PID ends
 import fs from "node:fs";
+import http from "node:http";
 import path from "node:path";
 import { execFileSync } from "node:child_process";
 import { pathToFileURL } from "node:url";
@@ -100,7 +103,7 @@ async function looks(page) {
     }
     await page.selectOption("#colour", "error");
     await page.selectOption("#range", "0.1");
-    await isNew("another range");
+    expect((await page.locator("#legend-low").textContent()) === "-0.1 or less", "another range");
     await page.selectOption("#colour", "plain");
     for (const shading of ["flat", "wire"]) {
         await page.click(`[data-shading=${shading}]`);
@@ -218,6 +221,95 @@ async function plays(page) {
         );
 }
 
+async function tools(page) {
+    await page.click("[data-view=front]");
+    const whole = await pictureOf(page);
+    await page.click("#points");
+    const both = await pictureOf(page);
+    await page.locator("#opacity").fill("30");
+    const clear = await pictureOf(page);
+    await page.click("#mesh");
+    const alone = await pictureOf(page);
+    expect(new Set([whole, both, clear, alone]).size === 4, "mesh, with points, seen through, points alone");
+    expect(await state(page, () => !window.neupig.stage.figures[0].surface.visible), "the mesh is hidden");
+    await page.keyboard.press("m");
+    await page.locator("#opacity").fill("100");
+    expect((await pictureOf(page)) === both, "it comes back as it was");
+    // the distance between two clicks is that of the places on the surface, and moves with it
+    await page.click("#measure");
+    const box = await page.locator("#canvas").boundingBox();
+    const x = box.x + box.width / 2;
+    await page.mouse.click(x, box.y + 0.4 * box.height);
+    await page.mouse.click(x, box.y + 0.6 * box.height);
+    const told = await page.locator("#ruler").textContent();
+    const ends = await state(page, () => {
+        const { ends, app } = window.neupig.ruler;
+        return ends.map((end) => app.stage.figures[0].placeOf(end));
+    });
+    const distance = Math.hypot(...ends[0].map((c, a) => c - ends[1][a]));
+    expect(distance > 0.05 && told.startsWith(`${distance.toPrecision(4)} in`), `${told}, not ${distance}`);
+    await state(page, () => window.neupig.seek(9));
+    await shows(page, 9);
+    expect((await page.locator("#ruler").textContent()) !== told, "the distance does not follow the surface");
+    await page.keyboard.press("Escape");
+    expect(await page.locator("#ruler").isHidden(), "the distance stays");
+    // a link leads to the same frame, side and colour
+    await page.selectOption("#colour", "error");
+    await page.click("#grid"); // it lies below the frame that was seen first
+    await page.click("[data-view=left]");
+    await page.waitForFunction(
+        () => {
+            const x = Number(window.neupig.stage.camera.position.x.toPrecision(6));
+            return location.hash.startsWith(`#frame=9&eye=${x},`) && location.hash.endsWith("colour=error");
+        },
+        null,
+        { timeout: 10000 },
+    );
+    const link = page.url();
+    const seen = await pictureOf(page);
+    await page.goto("about:blank");
+    await page.goto(link);
+    await ready(page);
+    await shows(page, 9);
+    await page.click("#points");
+    await page.click("#grid");
+    const other = await compare(page, await pictureOf(page), seen);
+    expect(other.mean < 0.5, `a link leads elsewhere: ${JSON.stringify(other)}`);
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click("#png")]);
+    expect(download.suggestedFilename() === "made-9.png", download.suggestedFilename());
+    const bytes = fs.readFileSync(await download.path());
+    const size = [bytes.readUInt32BE(16), bytes.readUInt32BE(20)];
+    const canvas = await state(page, () => [window.neupig.stage.canvas.width, window.neupig.stage.canvas.height]);
+    expect(size[0] === canvas[0] && size[1] === canvas[1] + 30, `${size}, the canvas has ${canvas}`);
+    await page.click("#full");
+    await page.waitForFunction(() => document.fullscreenElement, null, { timeout: 10000 });
+    await page.keyboard.press("x");
+    await page.waitForFunction(() => !document.fullscreenElement, null, { timeout: 10000 });
+}
+
+async function loading(page) {
+    const text = fs.readFileSync(path.resolve(where), "utf8");
+    const cut = text.indexOf("<script", text.indexOf('id="data-0-0-1"')); // 16 of 20 frames are there, then all
+    let finish;
+    const server = http.createServer((request, response) => {
+        response.writeHead(200, { "content-type": "text/html" });
+        response.write(text.slice(0, cut));
+        finish = () => response.end(text.slice(cut));
+    });
+    await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+    await page.goto(`http://127.0.0.1:${server.address().port}/view.html`, { waitUntil: "commit" });
+    const progress = page.locator("#progress-text");
+    await progress.filter({ hasText: "loading 100 %" }).waitFor({ timeout: 20000 });
+    const isDead = () =>
+        state(page, () => ["#tools", "footer", "header .buttons"].map((at) => document.querySelector(at).inert));
+    expect(String(await isDead()) === "true,true,true", `live before there is anything: ${await isDead()}`);
+    finish();
+    await ready(page);
+    expect(String(await isDead()) === "false,false,false", `dead although all is there: ${await isDead()}`);
+    expect(await page.locator("#progress").isHidden(), "the progress stays");
+    server.close();
+}
+
 async function picture(page, [stored]) {
     await state(page, () => {
         const app = window.neupig;
@@ -281,6 +373,10 @@ async function phone(page) {
         );
     }
     expect((await page.locator("#canvas").boundingBox()).height > 300, "the picture is small");
+    const cut = await page
+        .locator("#tools > *, #tools button, #transport > *")
+        .evaluateAll((all) => all.filter((e) => e.getBoundingClientRect().right > 391).map((e) => e.outerHTML));
+    expect(!cut.length, `beyond the right edge: ${cut}`);
     const before = await pictureOf(page);
     await page.tap("#next");
     await shows(page, 1);
@@ -325,7 +421,7 @@ async function live(page, [run, pid]) {
     expect(await page.locator("#progress").isHidden(), "the end");
 }
 
-const tests = { figures, looks, plays, picture, compare: compareResults, phone, names, live };
+const tests = { figures, looks, plays, tools, loading, picture, compare: compareResults, phone, names, live };
 const sizes = { picture: { width: 480, height: 480 }, phone: { width: 390, height: 844 } };
 const browser = await openBrowser(modules, program);
 try {

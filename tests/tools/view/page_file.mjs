@@ -6,7 +6,7 @@ import { readGroup, readPart } from "../../../tools/view/web/src/codec.js";
 export function readPage(path) {
     const text = fs.readFileSync(path, "utf8");
     const blocks = new Map();
-    for (const match of text.matchAll(/<script type="([a-z/]+)" id="([a-z0-9-]+)">([^<]*)<\/script>/g))
+    for (const match of text.matchAll(/<script type="([a-z/]+)" id="([a-z0-9-]+)"[^>]*>([^<]*)<\/script>/g))
         blocks.set(match[2], match[3]);
     return {
         facts: JSON.parse(blocks.get("facts")),
@@ -31,6 +31,12 @@ export function readPly(path) {
     for (let f = 0, at = end + stride * count("vertex"); f < count("face"); f++, at += 13)
         for (let k = 0; k < 3; k++) faces.push(bytes.readInt32LE(at + 1 + 4 * k));
     return { positions, faces };
+}
+
+/** Points of a capture's file: PLY, or a line "X Y Z" for each. */
+export function readPoints(path) {
+    if (path.endsWith(".ply")) return readPly(path).positions;
+    return Float64Array.from(fs.readFileSync(path, "utf8").trim().split(/\s+/), Number);
 }
 
 /** All frames of a part in the coordinates of its meshes. */

@@ -2,7 +2,7 @@
 //
 //     node build.mjs PAGE.html
 //
-// The page's policy allows this one script, by its checksum, and nothing from elsewhere: text that comes with a
+// The page's policy allows these two scripts, by their checksums, and nothing from elsewhere: text that comes with a
 // result can't be executed, whatever it is called.
 import { createHash } from "node:crypto";
 import { readFile, writeFile } from "node:fs/promises";
@@ -28,11 +28,12 @@ async function bundle(entry, options) {
 }
 
 const script = (await bundle("main.js", { format: "iife" })).replaceAll("</script", "<\\/script");
+const boot = (await bundle("boot.js", { format: "iife" })).replaceAll("</script", "<\\/script");
 const style = await bundle("style.css", {});
 const hash = (text) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
 const policy = [
     "default-src 'none'",
-    `script-src ${hash(script)}`,
+    `script-src ${hash(boot)} ${hash(script)}`,
     `style-src 'unsafe-inline'`,
     "img-src data: blob:",
     "base-uri 'none'",
@@ -41,5 +42,6 @@ const policy = [
 const page = (await readFile(new URL("page.html", folder), "utf8"))
     .replace("<!--policy-->", () => `<meta http-equiv="Content-Security-Policy" content="${policy}">`)
     .replace("<!--style-->", () => `<style>${style}</style>`)
+    .replace("<!--boot-->", () => `<script>${boot}</script>`)
     .replace("<!--script-->", () => `<script>${script}</script>`);
 await writeFile(output, page);

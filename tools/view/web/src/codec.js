@@ -140,13 +140,15 @@ function placePoints(values, at, count, grid, offset) {
     return points;
 }
 
-/** The frames of a group: {positions (V x 3), errors (V), points (N x 3)} each.  pause() is awaited after each. */
+/** The frames of a group: {positions (V x 3), errors (V), near (V), points, dropped (N x 3)} each.  pause() is awaited
+ * after each. */
 export async function readGroup(bytes, part, pause) {
     const reader = new Reader(bytes);
     const grid = reader.grid();
     const count = reader.u32();
     const sizes = [reader.u32(), reader.u32(), reader.u32()];
     const pointCounts = Array.from({ length: count }, () => reader.u32());
+    const droppedCounts = Array.from({ length: count }, () => reader.u32());
     const v = part.vertices;
     const left = await unpack(reader.take(sizes[0]), 3 * v * count);
     const leftErrors = await unpack(reader.take(sizes[1]), v * count);
@@ -163,11 +165,19 @@ export async function readGroup(bytes, part, pause) {
         }
         restoreRow(change, leftErrors, t * v, part.links);
         const shown = placePoints(points, at, pointCounts[t], grid, part.offset);
-        frames.push({ positions, errors: Uint8Array.from(change), points: shown });
+        const kept = shown.length - 3 * droppedCounts[t];
+        frames.push({
+            positions,
+            errors: Uint8Array.from(change, (x) => x >> 1),
+            near: Uint8Array.from(change, (x) => x & 1),
+            points: shown.subarray(0, kept),
+            dropped: shown.subarray(kept),
+        });
         await pause();
     }
     return frames;
 }
 
-/** Diagonals of a vertex's error as it is stored. */
-export const errorOf = (value) => (value / 255) ** 2 * ERROR_MAX;
+/** Diagonals that points lie outside the surface at a vertex, inside below 0, as it is stored; NaN: not known. */
+export const errorOf = (value) =>
+    value ? Math.sign(value - 128) * ((value - 128) / 127) ** 2 * ERROR_MAX : NaN;

@@ -3,7 +3,6 @@ import { errorOf } from "./codec.js";
 
 /** Stops of colour maps that keep their order in grey and for most who see colours differently (0xrrggbb). */
 const MAPS = {
-    heat: [0x14213d, 0x1f5f8b, 0x2a9d8f, 0xe9c46a, 0xf4772e, 0xd62839],
     diverging: [0x2166ac, 0x67a9cf, 0xf2f2f2, 0xef8a62, 0xb2182b],
     covered: [0xe07a3f, 0x3f8ec0],
     counts: [0x440154, 0x414487, 0x2a788e, 0x22a884, 0x7ad151, 0xfde725],
@@ -14,7 +13,7 @@ export const MODES = [
     { id: "vertex", label: "Vertex colour", shader: 1 },
     { id: "identity", label: "Identity (checker)", shader: 2 },
     { id: "normal", label: "Normal", shader: 3 },
-    { id: "error", label: "Error", shader: 4, map: "heat" },
+    { id: "error", label: "Error", shader: 4, map: "diverging" },
     { id: "stretch", label: "Stretch", shader: 4, map: "diverging" },
     { id: "coverage", label: "Coverage", shader: 4, map: "covered" },
     { id: "seen", label: "Seen in frames", shader: 4, map: "counts" },
@@ -61,18 +60,29 @@ export function gradientOf(name) {
         const [off, on] = [css(colourAt(MAPS.covered, 0)), css(colourAt(MAPS.covered, 1))];
         return `linear-gradient(90deg, ${off} 50%, ${on} 50%)`;
     }
-    const stops = [0, 0.2, 0.4, 0.6, 0.8, 1].map((share) => css(colourAt(MAPS[name], share)));
+    const stops = [0, 0.25, 0.5, 0.75, 1].map((share) => css(colourAt(MAPS[name], share)));
     return `linear-gradient(90deg, ${stops.join(", ")})`;
 }
 
 export const ERROR_RANGES = [0.1, 0.25, 0.5, 1, 2, 5];
 export const STRETCH_RANGE = 0.5;
 
-/** A range of errors that shows where a frame is worse than usual: of the 98th of 100 vertices. */
-export function errorRangeFor(errors) {
-    const sorted = Array.from(errors).sort((a, b) => a - b);
-    const high = 100 * errorOf(sorted[Math.floor(0.98 * (sorted.length - 1))] ?? 0);
-    return ERROR_RANGES.find((range) => range >= high) ?? ERROR_RANGES.at(-1);
+const most = (capture, what) =>
+    Math.max(...capture.results.flatMap((result) => result.facts.parts.map((part) => part[what] ?? 0)));
+const NOISES = 3; // standard deviations: what noise alone hardly reaches
+
+/** The noise of the points, per cent of the diagonal. */
+export const noiseOf = (capture) => 100 * most(capture, "noise");
+
+/** Ranges of errors to choose from, [per cent of the diagonal, label], and where to begin: what noise does not
+ * explain, but not below the bar, under which a frame is good. */
+export function errorRanges(capture) {
+    const noise = Number((NOISES * noiseOf(capture)).toPrecision(2));
+    const ranges = ERROR_RANGES.map((range) => [range, `${range} %`]);
+    if (noise > 0) ranges.unshift([noise, `${NOISES} x noise, ${noise} %`]);
+    const bar = most(capture, "bar");
+    const first = noise >= bar ? noise : (ERROR_RANGES.find((range) => range >= bar) ?? ERROR_RANGES.at(-1));
+    return { ranges, first };
 }
 
 /** Unique edges with their lengths at rest, and how many each vertex has. */
@@ -106,10 +116,10 @@ function lengthsOf(ends, positions) {
     return lengths;
 }
 
-function stretchOf(out, frame, edges) {
+function stretchOf(frame, edges) {
     const { ends, rest, count } = edges;
     const p = frame.positions;
-    out.fill(0);
+    const out = new Float32Array(count.length);
     for (let e = 0; e < rest.length; e++) {
         const i = ends[2 * e],
             j = ends[2 * e + 1];
@@ -122,23 +132,30 @@ function stretchOf(out, frame, edges) {
     }
     for (let i = 0; i < out.length; i++)
         out[i] = 0.5 + (count[i] ? out[i] / count[i] : 0) / (2 * STRETCH_RANGE);
+    return out;
 }
 
-/** Fill out (V, 0 to 1 along the mode's map) for a frame. */
+/** Fill out (V x 2: 0 to 1 along the mode's map, and 1; where it is not known 0, 0) for a frame. */
 export function fillShares(out, id, frame, store, range) {
     const { part, facts } = store;
+    let share = () => NaN;
     if (id === "stretch") {
         part.edges ??= edgesOf(part);
-        stretchOf(out, frame, part.edges);
+        const stretch = stretchOf(frame, part.edges);
+        share = (i) => stretch[i];
     } else if (id === "error") {
-        for (let i = 0; i < out.length; i++) out[i] = (100 * errorOf(frame.errors[i])) / range;
+        const clip = (x) => Math.min(Math.max(x, 0), 1);
+        share = (i) => clip(0.5 + (50 * errorOf(frame.errors[i])) / range);
     } else if (id === "coverage") {
-        for (let i = 0; i < out.length; i++) out[i] = errorOf(frame.errors[i]) <= facts.cover ? 1 : 0;
+        share = (i) => frame.near[i];
     } else if (id === "seen" && part.seen) {
-        const most = Math.max(1, facts.with_points ?? 1);
-        for (let i = 0; i < out.length; i++) out[i] = part.seen[i] / most;
-    } else {
-        out.fill(0);
+        const frames = Math.max(1, facts.with_points ?? 1);
+        share = (i) => part.seen[i] / frames;
+    }
+    for (let i = 0; i < part.vertices; i++) {
+        const at = share(i);
+        out[2 * i] = at || 0;
+        out[2 * i + 1] = Number.isNaN(at) ? 0 : 1;
     }
 }
 
@@ -149,7 +166,11 @@ export function legendOf(id, range, capture) {
     const frames = capture.results[0]?.facts.parts[0]?.with_points ?? 0;
     const cover = 100 * (capture.results[0]?.facts.parts[0]?.cover ?? 0.01);
     const texts = {
-        error: { title: "Vertex to nearest point, % of the diagonal", low: "0", high: `${range} or more` },
+        error: {
+            title: `Points inside, outside; % of the diagonal (noise ${noiseOf(capture).toPrecision(2)}). Grey: none near`,
+            low: `${-range} or less`,
+            high: `${range} or more`,
+        },
         stretch: { title: "Mean change of a vertex's edges", low: "-50 %", high: "+50 %" },
         coverage: {
             title: `A point within ${cover.toPrecision(2)} % of the diagonal`,

@@ -1,6 +1,7 @@
 // Buttons, lists and presses: what each does with the page.
-import { ERROR_RANGES } from "./colours.js";
+import { errorRanges } from "./colours.js";
 import { KEYS, listenToKeys } from "./keys.js";
+import { savePicture, toggleFullScreen } from "./picture.js";
 
 const element = (id) => document.getElementById(id);
 
@@ -18,6 +19,12 @@ export function listen(app) {
     on("worst", "click", () => app.toWorst());
     on("bad", "click", () => app.toBad());
     on("fit", "click", () => app.view(null));
+    on("mesh", "click", () => app.setMesh(!app.look.mesh));
+    on("opacity", "input", (event) => app.setOpacity(event.target.value / 100));
+    on("measure", "click", () => app.ruler.toggle());
+    on("png", "click", () => savePicture(app));
+    on("full", "click", () => toggleFullScreen());
+    element("full").disabled = !document.fullscreenEnabled;
     on("points", "click", () => app.setPoints(!app.look.points));
     on("grid", "click", () => app.setGrid(element("grid").getAttribute("aria-pressed") !== "true"));
     on("theme", "click", () => app.toggleTheme());
@@ -32,7 +39,9 @@ export function listen(app) {
         button.addEventListener("click", () => app.setShading(button.dataset.shading));
     for (const button of document.querySelectorAll("[data-view]"))
         button.addEventListener("click", () => app.view(button.dataset.view));
-    element("range").replaceChildren(...ERROR_RANGES.map((range) => new Option(`${range} %`, range)));
+    const { ranges, first } = errorRanges(app.capture);
+    element("range").replaceChildren(...ranges.map(([range, label]) => new Option(label, range)));
+    app.setRange(first);
     element("speed").replaceChildren(...SPEEDS.map((speed) => new Option(`${speed}\u00d7`, speed)));
     app.setSpeed(1);
     app.setShading("smooth");

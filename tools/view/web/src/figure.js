@@ -12,6 +12,7 @@ import {
     PointsMaterial,
     Raycaster,
     Sphere,
+    Triangle,
     Vector3,
 } from "three";
 import { edgesOf, fillShares, modeOf } from "./colours.js";
@@ -74,17 +75,26 @@ export class Figure {
         this.cover.polygonOffsetFactor = this.cover.polygonOffsetUnits = 1;
         this.lineMaterial = surfaceMaterial();
         this.lineMaterial.uniforms.uLines.value = true;
+        this.depth = surfaceMaterial(); // before a surface that is seen through: only its front is drawn
+        this.depth.colorWrite = false;
         this.points = this.#cloud(0xff9d2e, 2.6);
+        this.dropped = this.#cloud(0xd0219b, 4);
+        this.ends = this.#cloud(0x1aa6b7, 9); // what was measured between
+        this.ends.material.depthTest = false;
+        this.ruler = new Line(
+            new BufferGeometry(),
+            new LineBasicMaterial({ color: 0x1aa6b7, depthTest: false, transparent: true }),
+        );
         this.mark = this.#cloud(0xff2e88, 11);
         this.mark.material.depthTest = false;
         this.path = new Line(
             new BufferGeometry(),
             new LineBasicMaterial({ color: 0xff2e88, depthTest: false, transparent: true }),
         );
-        this.mark.renderOrder = this.path.renderOrder = 2;
-        this.path.frustumCulled = false;
-        this.path.visible = this.mark.visible = false;
-        this.group.add(this.points, this.path, this.mark);
+        for (const above of [this.mark, this.path, this.ends, this.ruler]) above.renderOrder = 4;
+        this.path.frustumCulled = this.ruler.frustumCulled = false;
+        this.path.visible = this.ruler.visible = false;
+        this.group.add(this.points, this.dropped, this.path, this.mark, this.ruler, this.ends);
     }
 
     #cloud(colour, size) {
@@ -106,7 +116,7 @@ export class Figure {
         geometry.setIndex(new BufferAttribute(part.faces, 1));
         geometry.setAttribute("position", dynamic(new Float32Array(3 * v), 3));
         geometry.setAttribute("normal", dynamic(new Float32Array(3 * v), 3));
-        geometry.setAttribute("share", dynamic(new Float32Array(v), 1));
+        geometry.setAttribute("share", dynamic(new Float32Array(2 * v), 2));
         const { low, high } = boundsOf(part.rest);
         const longest = Math.max(...high.map((x, a) => x - low[a])) || 1;
         const span = high.map((x, a) => Math.max((x - low[a]) / longest, 1e-6));
@@ -127,13 +137,16 @@ export class Figure {
         this.#drop();
         this.surface = new Mesh(geometry, this.material);
         this.lines = new LineSegments(wires, this.lineMaterial);
-        this.surface.frustumCulled = this.lines.frustumCulled = false;
-        this.group.add(this.surface, this.lines);
+        this.front = new Mesh(geometry, this.depth);
+        for (const object of [this.surface, this.lines, this.front]) object.frustumCulled = false;
+        this.front.renderOrder = 1;
+        this.surface.renderOrder = this.lines.renderOrder = 2;
+        this.group.add(this.surface, this.lines, this.front);
         this.store = store;
     }
 
     #drop() {
-        for (const object of [this.surface, this.lines]) {
+        for (const object of [this.surface, this.lines, this.front]) {
             if (!object) continue;
             this.group.remove(object);
             object.geometry.dispose();
@@ -153,6 +166,7 @@ export class Figure {
         fillNormals(normal.array, frame.positions, store.part.faces);
         position.needsUpdate = normal.needsUpdate = true;
         this.#place(this.points, frame.points);
+        this.#place(this.dropped, frame.dropped);
     }
 
     #place(object, positions) {
@@ -162,7 +176,20 @@ export class Figure {
         object.geometry.boundingSphere = everywhere;
     }
 
-    /** look: {shading, colour, range, points, plain} */
+    /** How much the surface hides, 0 to 1; what lies behind its front is seen through that alone. */
+    #setOpacity(opacity) {
+        const isClear = opacity < 1;
+        for (const material of [this.material, this.cover, this.lineMaterial]) {
+            material.uniforms.uOpacity.value = opacity;
+            if (material.transparent !== isClear) material.needsUpdate = true;
+            material.transparent = isClear;
+        }
+        this.depth.transparent = isClear; // after the points, which are not
+        if (this.front) this.front.visible = this.hasMesh && isClear && opacity > 0;
+        return opacity > 0;
+    }
+
+    /** look: {shading, colour, range, points, opacity, plain} */
     dress(look) {
         const mode = modeOf(look.colour),
             isWire = look.shading === "wire";
@@ -180,16 +207,18 @@ export class Figure {
         this.cover.uniforms.uMode.value = 0;
         this.cover.uniforms.uLines.value = true;
         this.cover.uniforms.uPlain.value = new Color(look.ground).toArray();
+        const isSeen = this.#setOpacity(look.opacity) && this.hasMesh;
         if (this.surface) {
-            this.surface.visible = this.hasMesh;
+            this.surface.visible = isSeen;
             this.surface.material = isWire ? this.cover : this.material;
-            this.lines.visible = this.hasMesh && isWire;
+            this.lines.visible = isSeen && isWire;
         }
         this.points.visible = look.points && Boolean(this.frame?.points.length);
+        this.dropped.visible = look.points && Boolean(this.frame?.dropped.length);
         this.points.material.color.set(look.pointColour);
     }
 
-    /** The vertex under a ray: {vertex, distance}, or null. */
+    /** Where a ray meets the surface: {vertex, corners, weights}, or null. */
     pick(ray) {
         if (!this.surface?.visible) return null;
         const caster = new Raycaster(ray.origin, ray.direction);
@@ -200,8 +229,32 @@ export class Figure {
         const { a, b, c } = hit.face;
         return {
             vertex: [a, b, c].reduce((best, i) => (far(i) < far(best) ? i : best)),
-            distance: hit.distance,
+            corners: [a, b, c],
+            weights: Triangle.getBarycoord(
+                hit.point,
+                ...[a, b, c].map((i) => new Vector3(...p.subarray(3 * i, 3 * i + 3))),
+                new Vector3(),
+            ).toArray(),
         };
+    }
+
+    /** The place of a hit in the frame that is shown. */
+    placeOf({ corners, weights }) {
+        const p = this.frame.positions;
+        return [0, 1, 2].map((a) => corners.reduce((sum, i, k) => sum + weights[k] * p[3 * i + a], 0));
+    }
+
+    /** Marks where was measured, none, one or two, and the line between two. */
+    setRuler(hits) {
+        const isShown = Boolean(this.frame && this.hasMesh && hits.length);
+        this.ends.visible = isShown;
+        this.ruler.visible = isShown && hits.length === 2;
+        if (!isShown) return null;
+        const places = hits.map((hit) => this.placeOf(hit));
+        this.#place(this.ends, Float32Array.from(places.flat()));
+        if (places.length < 2) return null;
+        this.#place(this.ruler, Float32Array.from(places.flat()));
+        return Math.hypot(...places[0].map((x, a) => x - places[1][a]));
     }
 
     /** Mark a vertex with its way through all frames; null: none. */

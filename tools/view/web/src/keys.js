@@ -1,4 +1,6 @@
 // Keys, and the list of them that the help shows.
+import { savePicture, toggleFullScreen } from "./picture.js";
+
 export const KEYS = [
     [["Space"], "play or pause"],
     [["\u2190", "\u2192"], "one frame back or on; with Shift ten"],
@@ -10,9 +12,11 @@ export const KEYS = [
     [["1", "2", "3", "4", "5"], "from the front, right, back, left, top"],
     [["F"], "fit into view"],
     [["S", "C"], "next shading, next colour mode"],
-    [["O", "G"], "points, grid"],
+    [["M", "O", "G"], "mesh, points, grid"],
+    [["D"], "distance between two clicks"],
+    [["P", "X"], "picture as PNG, full screen"],
     [["T"], "dark or light"],
-    [["Esc"], "let go of the vertex"],
+    [["Esc"], "let go of the vertex and the distance"],
     [["?"], "this list"],
 ];
 
@@ -37,10 +41,17 @@ function actionsOf(app) {
         f: () => app.view(null),
         s: () => app.nextShading(),
         c: () => app.nextColour(),
+        m: () => app.setMesh(!app.look.mesh),
         o: () => app.setPoints(!app.look.points),
+        d: () => app.ruler.toggle(),
+        p: () => savePicture(app),
+        x: () => toggleFullScreen(),
         g: () => document.getElementById("grid").click(),
         t: () => app.toggleTheme(),
-        escape: () => app.setPick(null),
+        escape: () => {
+            app.setPick(null);
+            app.ruler.clear();
+        },
         "?": () => document.getElementById("help-dialog").showModal(),
     };
     VIEWS.forEach((name, i) => (actions[`${i + 1}`] = () => app.view(name)));

@@ -73,3 +73,8 @@ export function showBadge(capture) {
     const isOpen = capture.results.some((result) => !result.facts.done);
     badge.textContent = `${isOpen ? "not finished, " : ""}${hasAlarm ? "alarm, " : ""}${faults ? `${faults} frames to look at` : "all frames good"}`;
 }
+
+/** Buttons are dead until there is something to press them for. */
+export function wake() {
+    for (const sleeping of document.querySelectorAll("[inert]")) sleeping.inert = false;
+}

@@ -1,11 +1,13 @@
 // neupig view: the page.  Puts together what is shown, and listens.
+import { followInAddress, goToAddress } from "./address.js";
 import { Capture } from "./capture.js";
-import { errorRangeFor, gradientOf, lackOf, legendOf, MODES } from "./colours.js";
+import { gradientOf, lackOf, legendOf, MODES } from "./colours.js";
 import { listen, SPEEDS } from "./controls.js";
 import { follow } from "./live.js";
 import { historyOf, showFrame, showResult, showVertex } from "./panel.js";
-import { fillColours, listMarks, namePanes, showBadge } from "./labels.js";
+import { fillColours, listMarks, namePanes, showBadge, wake } from "./labels.js";
 import { Player } from "./player.js";
+import { Ruler } from "./ruler.js";
 import { Stage } from "./stage.js";
 import { Timeline } from "./timeline.js";
 
@@ -16,7 +18,7 @@ const SHADINGS = ["smooth", "flat", "wire"];
 class App {
     constructor(facts) {
         this.capture = new Capture(facts);
-        this.look = { shading: "smooth", colour: "plain", range: 1, points: false };
+        this.look = { shading: "smooth", colour: "plain", range: 1, mesh: true, opacity: 1, points: false };
         this.pick = null;
         this.isDirty = true;
         this.pictures = 0; // drawn so far
@@ -34,12 +36,14 @@ class App {
         );
         this.player = new Player(capture);
         this.timeline = new Timeline(element("timeline"), capture, (slot) => this.seek(slot));
+        this.ruler = new Ruler(this);
         listen(this);
-        this.setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+        this.setTheme(document.documentElement.dataset.theme);
         new ResizeObserver(() => this.resize()).observe(element("viewport"));
         this.resize();
         this.refreshFacts();
         this.seek(0);
+        if (!capture.isLive) goToAddress(this);
         requestAnimationFrame((now) => this.#picture(now));
     }
 
@@ -126,16 +130,17 @@ class App {
             .map(([r, text]) => (capture.results.length > 1 ? `${"AB"[r]}: ${text}` : text))
             .join(", ");
         this.#movePick();
+        this.ruler.update();
         this.dress();
         return true;
     }
 
     #firstLook() {
-        const errors = this.shown.frames.find((frame) => frame)?.data.errors ?? [];
-        this.look.range = errorRangeFor(errors);
-        element("range").value = this.look.range;
+        wake();
+        element("progress").hidden = !this.capture.isLive;
         this.stage.fit([28, 14]);
         if (this.lookFrom) this.stage.lookFrom(this.lookFrom);
+        if (!this.capture.isLive) followInAddress(this);
         this.stage.placeGrid(this.stage.bounds());
         fillColours(this);
     }
@@ -144,11 +149,14 @@ class App {
         const { colour } = this.look;
         const look = {
             ...this.look,
+            opacity: this.look.mesh ? this.look.opacity : 0,
             plain: css("--surface") || "#b9c0cb",
             ground: css("--ground"),
             pointColour: colour === "plain" ? "#f08a1d" : css("--text"),
         };
         for (const figure of this.stage.figures) figure.dress(look);
+        element("points-key").hidden = !look.points || !this.stage.figures.some((f) => f.dropped.visible);
+        element("points-key").firstChild.style.setProperty("--mark", look.pointColour);
         const legend = legendOf(colour, look.range, this.capture);
         element("legend").hidden = !legend;
         if (legend) {
@@ -231,6 +239,18 @@ class App {
         this.dress();
     }
 
+    setMesh(isShown) {
+        this.look.mesh = isShown;
+        element("mesh").setAttribute("aria-pressed", isShown);
+        this.dress();
+    }
+
+    setOpacity(opacity) {
+        this.look.opacity = opacity;
+        element("opacity").value = 100 * opacity;
+        this.dress();
+    }
+
     setGrid(isShown) {
         this.stage.setGrid(isShown);
         element("grid").setAttribute("aria-pressed", isShown);
@@ -277,6 +297,7 @@ class App {
 
     async pickAt(x, y) {
         const hit = this.stage.pick(x, y);
+        if (this.ruler.isOn) return this.ruler.add(hit);
         return this.setPick(hit);
     }
 

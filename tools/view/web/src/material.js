@@ -5,9 +5,9 @@ import { mapBytes } from "./colours.js";
 const VERTEX = `
 attribute vec3 rest;
 attribute vec3 tint;
-attribute float share;
+attribute vec2 share;
 varying vec3 vView, vNormal, vWorldNormal, vRest, vTint;
-varying float vShare;
+varying vec2 vShare;
 uniform float uPull;
 void main() {
     vec4 at = modelViewMatrix * vec4(position, 1.0);
@@ -24,12 +24,12 @@ void main() {
 const FRAGMENT = `
 uniform int uMode;
 uniform bool uFlat, uLines;
-uniform float uCells;
+uniform float uCells, uOpacity;
 uniform vec3 uSpan;
 uniform vec3 uPlain;
 uniform sampler2D uMap;
 varying vec3 vView, vNormal, vWorldNormal, vRest, vTint;
-varying float vShare;
+varying vec2 vShare;
 
 vec3 checker() {
     vec3 cell = floor(vRest * uCells);
@@ -46,7 +46,10 @@ void main() {
     if (uMode == 1) colour = vTint;
     if (uMode == 2) colour = checker();
     if (uMode == 3) colour = 0.5 + 0.5 * normalize(vWorldNormal);
-    if (uMode == 4) colour = texture2D(uMap, vec2(clamp(vShare, 0.002, 0.998), 0.5)).rgb;
+    if (uMode == 4) { // share is 0, 0 where nothing is known
+        vec3 known = texture2D(uMap, vec2(clamp(vShare.x / max(vShare.y, 1e-4), 0.002, 0.998), 0.5)).rgb;
+        colour = mix(vec3(0.5), known, vShare.y);
+    }
     if (!gl_FrontFacing) colour *= 0.55;
     float key = max(dot(normal, normalize(vec3(0.35, 0.55, 0.75))), 0.0);
     float fill = 0.5 + 0.5 * dot(normal, normalize(vec3(-0.5, 0.2, 0.6)));
@@ -55,7 +58,7 @@ void main() {
     float gloss = uMode == 0 ? 0.10 * pow(max(dot(normal, halfway), 0.0), 28.0) : 0.0;
     if (uMode == 3) light = 1.0;
     if (uMode == 4 || uMode == 2 || uMode == 1) light = mix(1.0, light, 0.72);
-    gl_FragColor = vec4(uLines ? colour : colour * light + gloss, 1.0);
+    gl_FragColor = vec4(uLines ? colour : colour * light + gloss, uOpacity);
 }`;
 
 function texture(name) {
@@ -78,10 +81,11 @@ export function surfaceMaterial() {
             uFlat: { value: false },
             uLines: { value: false },
             uPull: { value: 0 },
+            uOpacity: { value: 1 },
             uCells: { value: 12 },
             uSpan: { value: [1, 1, 1] }, // of the reference's sides, in its longest
             uPlain: { value: [0.72, 0.74, 0.78] },
-            uMap: { value: mapTexture("heat") },
+            uMap: { value: mapTexture("diverging") },
         },
     });
 }

@@ -137,11 +137,12 @@ export function showVertex(pick, place) {
         rows.push(["Error in this frame", textOfError(history.errors[place])]);
         const known = history.errors.filter((x) => !Number.isNaN(x));
         if (known.length) {
-            rows.push(["Error, mean", textOfError(known.reduce((a, b) => a + b, 0) / known.length)]);
-            rows.push(["Error, worst", textOfError(Math.max(...known))]);
+            const sizes = known.map(Math.abs);
+            rows.push(["Size, mean", textOfError(sizes.reduce((a, b) => a + b, 0) / known.length)]);
+            rows.push(["Size, worst", textOfError(Math.max(...sizes))]);
         }
         rows.push(["Way in all frames", lengthOf(history.way).toPrecision(4)]);
-        drawCurve(curve, history.errors, place, vertex);
+        drawCurve(curve, history.errors.map(Math.abs), place, vertex);
     } else {
         rows.push(["", "reading all frames ..."]);
     }
@@ -149,7 +150,11 @@ export function showVertex(pick, place) {
 }
 
 const textOfError = (error) =>
-    Number.isNaN(error) ? "no points" : error >= 5 ? "5 % or more" : `${error.toPrecision(2)} %`;
+    Number.isNaN(error)
+        ? "no points near"
+        : Math.abs(error) >= 5
+          ? `${Math.sign(error) * 5} % or more`
+          : `${error.toPrecision(2)} %`;
 
 function lengthOf(way) {
     let sum = 0;
@@ -187,6 +192,6 @@ function drawCurve(canvas, errors, place, vertex) {
     c.fillRect(x(place) - 0.75, 4, 1.5, height - 8);
     canvas.setAttribute(
         "aria-label",
-        `Error of vertex ${vertex} over ${errors.length} frames, at most ${(most / 1.1).toPrecision(2)} per cent of the diagonal`,
+        `Size of the error of vertex ${vertex} over ${errors.length} frames, at most ${(most / 1.1).toPrecision(2)} per cent of the diagonal`,
     );
 }

@@ -1,12 +1,17 @@
 // The picture: one or two views of the same space, seen by one camera.
 import {
+    AxesHelper,
+    CanvasTexture,
     Color,
     ColorManagement,
     GridHelper,
     LinearSRGBColorSpace,
+    OrthographicCamera,
     PerspectiveCamera,
     Ray,
     Scene,
+    Sprite,
+    SpriteMaterial,
     Vector2,
     Vector3,
     WebGLRenderer,
@@ -28,6 +33,49 @@ function isSoftware() {
     const name = context.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : context.RENDERER);
     context.getExtension("WEBGL_lose_context")?.loseContext();
     return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
+const AXES = [
+    ["X", 0xd9424a],
+    ["Y", 0x3c9a4f],
+    ["Z", 0x3e63dd],
+];
+
+function letter(text, colour) {
+    const canvas = document.createElement("canvas");
+    canvas.width = canvas.height = 64;
+    const c = canvas.getContext("2d");
+    c.font = "bold 52px system-ui, sans-serif";
+    c.textAlign = "center";
+    c.textBaseline = "middle";
+    c.fillStyle = `#${new Color(colour).getHexString()}`;
+    c.fillText(text, 32, 34);
+    return new Sprite(new SpriteMaterial({ map: new CanvasTexture(canvas), depthTest: false }));
+}
+
+/** The capture's axes, for a corner of the picture. */
+class Gizmo {
+    constructor() {
+        this.scene = new Scene();
+        this.camera = new OrthographicCamera(-1.6, 1.6, 1.6, -1.6, 0.1, 20);
+        this.scene.add(new AxesHelper(1).setColors(...AXES.map(([, colour]) => colour)));
+        AXES.forEach(([text, colour], a) => {
+            const name = letter(text, colour);
+            name.position.setComponent(a, 1.3);
+            name.scale.setScalar(0.6);
+            this.scene.add(name);
+        });
+    }
+
+    draw(renderer, camera, [left, bottom, side]) {
+        renderer.setViewport(left, bottom, side, side);
+        renderer.setScissor(left, bottom, side, side);
+        renderer.clearDepth();
+        this.camera.up.copy(camera.up);
+        this.camera.quaternion.copy(camera.quaternion);
+        this.camera.position.set(0, 0, 6).applyQuaternion(camera.quaternion);
+        renderer.render(this.scene, this.camera);
+    }
 }
 
 export class Stage {
@@ -52,6 +100,7 @@ export class Stage {
         this.controls.addEventListener("change", onChange);
         this.controls.addEventListener("start", () => (this.isTurning = true));
         this.controls.addEventListener("end", () => (this.isTurning = false));
+        this.gizmo = new Gizmo();
         this.panes = Array.from({ length: count }, () => {
             const pane = { scene: new Scene(), figure: new Figure(), grid: null };
             pane.scene.add(pane.figure.group);
@@ -155,6 +204,8 @@ export class Stage {
             renderer.clear();
             this.#aim(w / Math.max(h, 1));
             renderer.render(this.panes[i].scene, this.camera);
+            const side = Math.min(84, w / 4, h / 4);
+            this.gizmo.draw(renderer, this.camera, [left + w - side - 6, height - top - h + 6, side]);
         });
     }
 
@@ -201,7 +252,7 @@ export class Stage {
         return this.up === "z" ? new Vector3(side, -ahead, above) : new Vector3(side, above, ahead);
     }
 
-    /** The vertex at a place of the canvas: {result, vertex}, or null. */
+    /** What is at a place of the canvas: {result, vertex, corners, weights}, or null. */
     pick(x, y) {
         const panes = this.layout();
         const i = panes.findIndex(
@@ -215,6 +266,6 @@ export class Stage {
         const origin = this.camera.position.clone();
         const direction = new Vector3(at.x, at.y, 0.5).unproject(this.camera).sub(origin).normalize();
         const hit = this.figures[i].pick(new Ray(origin, direction));
-        return hit ? { result: i, vertex: hit.vertex } : null;
+        return hit ? { result: i, ...hit } : null;
     }
 }

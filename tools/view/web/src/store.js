@@ -46,7 +46,7 @@ export class PartStore {
     open() {
         this.opening ??= this.source.partBytes().then(async (bytes) => {
             this.part = await readPart(bytes, this.offset);
-            const bytesOfGroup = this.size * (13 * this.part.vertices + 12 * 4000);
+            const bytesOfGroup = this.size * (14 * this.part.vertices + 12 * 4000);
             this.most = Math.max(3, Math.floor(BYTES_AT_MOST / bytesOfGroup));
         });
         return this.opening;
