@@ -401,6 +401,21 @@ typedef struct npg_eval_settings {
  * NPG_USAGE, NPG_MEMORY.  Thread-safe. */
 NPG_API npg_status npg_eval(npg_eval_figures *all, const npg_eval_settings *settings);
 
+/* ---- other formats of a run that is done ---- */
+
+typedef struct npg_exported {
+    size_t struct_size;
+    size_t files;    /* that were made; 0: all lay there already                              */
+    size_t repeated; /* frames without a mesh that repeat the one before them in pc2, mdd ... */
+} npg_exported;
+
+/* Make formats (a list as of option export: "glb,usda") of the meshes in output, the folder of a run, beside what
+ * lies there.  What lies there as it was written is left alone.  done.json comes last: until then, and when it is
+ * broken off, the result is the one it was.  Takes the folder's lock.  NPG_USAGE: no such format, one that can't hold
+ * the capture, no run, or one that is at work; NPG_BAD_INPUT: it is not done, or its meshes were changed; NPG_DISK,
+ * NPG_MEMORY.  Thread-safe. */
+NPG_API npg_status npg_export(npg_exported *exported, const char *output, const char *list);
+
 /* ---- another mesh, or points, through a run that is done ---- */
 
 /* A point p hangs on the closest place c of the reference (face and weights): in a frame it is
@@ -409,9 +424,9 @@ typedef struct npg_apply_settings {
     size_t struct_size;
     const char *job;    /* output folder of the run; its meshes are still there                           */
     const char *mesh;   /* a file of a mesh or of points, in the coordinates of the job's reference.ply   */
-    const char *output; /* folder for <prefix>_<number>.<ending>, and done.json, which comes last         */
+    const char *output; /* folder for <prefix>_<number>.ply or .obj, other forms, and last done.json      */
     const char *prefix; /* NULL: "frame"                                                                  */
-    const char *ending; /* "ply", "obj", or NULL: as the mesh's own, ply for other points                 */
+    const char *forms;  /* a list as of option export; NULL: ply, or obj where the mesh's file is         */
     int64_t fps_scale;  /* steps from each frame to the next; above 1 the files are numbered 0, 1, 2 ...  */
     double far_share;   /* of the reference's diagonal: points farther from it are counted                */
     int overwrite;      /* files of the same prefix that lie there are removed; else they are refused     */

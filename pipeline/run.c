@@ -302,6 +302,20 @@ static void warn_of_resident(npg_run *run)
     npg_run_log(run, NPG_LOG_WARNING, "run", -1, text);
 }
 
+/* Of each stage, where a run has ended, or was done before. */
+static npg_status have_last_words(npg_run *run, bool again)
+{
+    npg_status status = open_worker_states(run);
+    for (size_t i = 0; i < run->worker_count && !status; i++) {
+        npg_worker *worker = &run->workers[i];
+        npg_status (*word)(npg_worker *) = again ? worker->stage->again : worker->stage->conclude;
+        if (word) status = word(worker);
+    }
+    for (size_t i = 0; i < run->worker_count; i++) npg_release(&run->workers[i].state);
+    if (status) npg_run_fail(run, "run", status);
+    return status;
+}
+
 static npg_status conclude(npg_run *run)
 {
     json_t *r = run->report;
@@ -312,11 +326,7 @@ static npg_status conclude(npg_run *run)
                                         run->is_partial ? 7 : 0, "cores", (int)sysconf(_SC_NPROCESSORS_ONLN),
                                         "memory_peak_bytes", (json_int_t)npg_memory_peak(),
                                         "resident_peak_bytes", resident_peak()));
-    npg_status status = open_worker_states(run);
-    for (size_t i = 0; i < run->worker_count && !status; i++)
-        if (run->workers[i].stage->conclude) status = run->workers[i].stage->conclude(&run->workers[i]);
-    for (size_t i = 0; i < run->worker_count; i++) npg_release(&run->workers[i].state);
-    return status;
+    return have_last_words(run, false);
 }
 
 static npg_status begin(npg_run *run)
@@ -337,7 +347,7 @@ static npg_status do_passes(npg_run *run)
 {
     npg_status begun = begin(run);
     if (begun == NPG_END) npg_latch_abort(run->begun_latch); /* nobody waits for passes that never come */
-    if (begun) return begun == NPG_END ? NPG_OK : begun;
+    if (begun) return begun == NPG_END ? have_last_words(run, true) : begun;
     npg_latch_raise(run->begun_latch, 1);
     if (!run->facts.is_resumed) {
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
@@ -347,9 +357,7 @@ static npg_status do_passes(npg_run *run)
     }
     run->closed_reports = json_deep_copy(json_object_get(run->report, "stages"));
     NPG_TRY(do_pass(run, NPG_PASS_SOLVE));
-    npg_status status = conclude(run);
-    if (status) npg_run_fail(run, "run", status);
-    return status;
+    return conclude(run);
 }
 
 static void *conduct(void *argument)

@@ -179,6 +179,9 @@ typedef struct npg_stage {
     double (*expects)(const npg_worker *worker, npg_pass pass);
     /* After all stages ended well: the last word (files that must come last).  May be NULL. */
     npg_status (*conclude)(npg_worker *worker);
+    /* In the place of all passes, where begin() of another stage found that the run was done before: what is still to
+     * be made of its results.  May be NULL. */
+    npg_status (*again)(npg_worker *worker);
 } npg_stage;
 
 /* In the order of the data's way, NULL at the end (stages/chain.c). */

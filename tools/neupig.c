@@ -41,6 +41,12 @@ const npg_verb npg_verbs[] = {
      "Exit code 0 when all are done, 7 when all are done but some with frames skipped "
      "or below the quality bar, 1 when one is not done, 75 after a signal.",
      npg_batch_options, true, npg_verb_batch},
+    {"export", "OUT --export LIST", 1, 1, "Write other formats of a finished run",
+     "OUT is the output folder of a run that is done, without segments.  "
+     "Formats of the list that are not there yet are made of its meshes, as the run would have made them, "
+     "and done.json then lists them, too.  "
+     "Broken off, the result is what it was.  Frames that are appended later make them anew.",
+     npg_export_options, false, npg_verb_export},
     {"apply", "JOB --mesh FILE -o OUT", 1, 1, "Carry another mesh or points through a finished run",
      "JOB is the output folder of a run that is done.  "
      "FILE (a mesh, or points alone) lies on or near the reference.ply of the run; "

@@ -5,9 +5,8 @@
 #include "tools/segments/segments.h"
 
 typedef struct settings {
-    const char *mesh, *output, *prefix;
+    const char *mesh, *output, *prefix, *list;
     int64_t fps_scale;
-    int format;
     double far_share;
     bool overwrite;
 } settings;
@@ -26,8 +25,9 @@ const npg_option npg_apply_options[] = {
         "more than 1 adds in-between frames, on curves through the run's, and numbers the files 0, 1, 2 ..."),
     NPG_ROW_REAL  ("far",       AT(far_share), "0.05",  0,     1e6,  "SHARE",
         "Points farther from the reference than this share of its diagonal are reported (exit code 7)"),
-    NPG_ROW_CHOICE("format",    AT(format),    "mesh",  "mesh|ply|obj",
-        "Format of the files; mesh: as the mesh that is carried (PLY for other points)"),
+    NPG_ROW_TEXT  ("export",    AT(list),      "",      "LIST",
+        "What to write, with commas, as of neupig run: ply, obj, pc2, mdd, glb, usda, npz, vdb. "
+        "Without: OBJ of an OBJ file, PLY of others"),
     NPG_ROW_TEXT  ("prefix",    AT(prefix),    "frame", "NAME",
         "First part of the files' names"),
     NPG_ROW_FLAG  ("overwrite", AT(overwrite), "no",
@@ -40,9 +40,8 @@ npg_status npg_verb_apply(const npg_cli *cli)
     const settings *s = cli->values;
     const char *job = cli->operands[0];
     npg_applied applied = {.struct_size = sizeof applied};
-    static const char *const endings[] = {NULL, "ply", "obj"}; /* as the words of --format */
-    const npg_apply_settings all = {sizeof all,         job,          s->mesh,      s->output,   s->prefix,
-                                    endings[s->format], s->fps_scale, s->far_share, s->overwrite};
+    const npg_apply_settings all = {sizeof all, job,          s->mesh,      s->output,   s->prefix,
+                                    s->list,    s->fps_scale, s->far_share, s->overwrite};
     NPG_TRY(npg_segments_refuse(job, "apply", false));
     npg_status status = npg_apply(&applied, &all);
     if (applied.far_count)

@@ -113,7 +113,7 @@ static void end_watching(watcher *w)
 
 void npg_run_job_results(const char *verb, const char *output, npg_status status)
 {
-    static const char *const names[] = {"meshes",      "reference.ply", "frames.jsonl", "exports.jsonl",
+    static const char *const names[] = {"meshes",      "reference.ply", "frames.jsonl",
                                         "report.json", "segments.json", "done.json"};
     char path[4096];
     if (status == NPG_STOPPED) fprintf(stderr, "neupig %s: stopped on request; run again to resume\n", verb);

@@ -1,5 +1,7 @@
 /* Apply: another mesh, or points, carried through all frames of a finished run. */
 #include <jansson.h>
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -26,6 +28,7 @@ typedef struct applying {
     float *between;     /* reference's V x 3                                                      */
     double *pos;        /* carried's V x 3                                                        */
     float *pos_float;   /* the same, where normals are made from it                               */
+    float *pos_world;   /* and where it is written, for formats that hold floats                  */
     float *normals;     /* carried's V x 3, or NULL                                               */
     bool turns_normals; /* they are the file's own                                                */
     bool is_like;       /* OBJ from OBJ: the file's lines are kept                                */
@@ -35,24 +38,13 @@ typedef struct applying {
     size_t frame_count;
     int64_t number_max;
     int64_t first_index, last_index;
-    double fps;
+    json_t *done; /* of the job, owned */
+    npg_export_choice choice;
+    npg_export_facts facts;
+    npg_exporters_pass pass;
 } applying;
 
 /* ---- the job ---- */
-
-static npg_status check_job(applying *a)
-{
-    if (!npg_folder_has_run(a->s->job))
-        return npg_error(NPG_USAGE, "%s is not the output folder of neupig run", a->s->job);
-    if (!npg_is_in_folder(a->s->job, "done.json") || !npg_is_in_folder(a->s->job, "frames.jsonl"))
-        return npg_error(NPG_BAD_INPUT, "%s: the run is not finished (there is no %s); run it again first",
-                         a->s->job, npg_is_in_folder(a->s->job, "done.json") ? "frames.jsonl" : "done.json");
-    json_t *done;
-    NPG_TRY(npg_json_load(&done, a->s->job, "done.json", NPG_BAD_INPUT));
-    a->fps = json_number_value(json_object_get(done, "fps"));
-    json_decref(done);
-    return NPG_OK;
-}
 
 static npg_status count_line(void *user, const json_t *frame, const char *line, size_t size)
 {
@@ -77,7 +69,7 @@ static npg_status count_line(void *user, const json_t *frame, const char *line, 
 static npg_status open_job(applying *a)
 {
     char path[NPG_PATH_SIZE];
-    NPG_TRY(check_job(a));
+    NPG_TRY(npg_export_open_done(&a->done, a->s->job, "apply"));
     NPG_TRY(npg_json_lines(a->s->job, "frames.jsonl", -1, count_line, a));
     if (!a->frame_count) return npg_error(NPG_BAD_INPUT, "%s/frames.jsonl names no mesh", a->s->job);
     NPG_TRY(npg_path_of(path, a->s->job, "reference.ply"));
@@ -141,6 +133,7 @@ static npg_status open_carried(applying *a)
     NPG_TRY(npg_mesh_require_finite(mesh, a->s->mesh));
     a->turns_normals = mesh->vert_normals != NULL;
     a->pos = npg_arena_take(&a->arena, v, 3 * sizeof *a->pos);
+    a->pos_world = npg_arena_take(&a->arena, v, 3 * sizeof *a->pos_world);
     a->between = npg_arena_take(&a->arena, a->reference->vert_count, 3 * sizeof *a->between);
     for (int i = 0; i < 4; i++)
         a->window[i].vert_pos = npg_arena_take(&a->arena, a->reference->vert_count, 3 * sizeof(float));
@@ -171,7 +164,8 @@ static bool is_own_name(const applying *a, const char *name)
 static npg_status clear_file(void *user, const char *name)
 {
     const applying *a = user;
-    if (!is_own_name(a, name)) return NPG_OK;
+    bool is_own = is_own_name(a, name);
+    if (!is_own && (a->s->overwrite || !npg_exporters_own(name))) return NPG_OK;
     if (a->s->overwrite) return npg_file_remove(a->s->output, name);
     return npg_error(NPG_USAGE,
                      "%s/%s lies there already and would mix with the new files: "
@@ -181,10 +175,10 @@ static npg_status clear_file(void *user, const char *name)
 
 static void choose_names(applying *a)
 {
-    const char *dot = strrchr(a->s->mesh, '.');
-    bool is_obj = a->s->ending ? !strcmp(a->s->ending, "obj") : dot && !strcasecmp(dot, ".obj");
     const char *read_as = npg_reader_for(a->s->mesh);
+    bool is_obj = a->choice.is_obj;
     a->is_like = is_obj && read_as && !strcmp(read_as, "obj");
+    a->facts.like = read_as && !strcmp(read_as, "obj") ? a->s->mesh : NULL;
     int64_t steps = (a->last_index - a->first_index) * a->s->fps_scale;
     a->names = (npg_mesh_names){.prefix = a->s->prefix,
                                 .ending = is_obj ? "obj" : "ply",
@@ -200,22 +194,72 @@ static npg_status open_output(applying *a)
         return npg_error(NPG_USAGE, "%s holds a run; choose another output folder", output);
     if (!a->s->overwrite) NPG_TRY(npg_folder_each(output, NPG_DISK, clear_file, a));
     NPG_TRY(npg_file_remove(output, "done.json")); /* first: what is left can't pass for whole */
-    return a->s->overwrite ? npg_folder_each(output, NPG_DISK, clear_file, a) : NPG_OK;
+    if (!a->s->overwrite) return NPG_OK;
+    NPG_TRY(npg_exporters_clear(output));
+    return npg_folder_each(output, NPG_DISK, clear_file, a);
+}
+
+/* ---- other formats ---- */
+
+static const char *option_of(const applying *a, const char *name)
+{
+    const char *text = json_string_value(json_object_get(json_object_get(a->done, "options"), name));
+    return text ? text : "";
+}
+
+static npg_status choose(applying *a)
+{
+    const char *dot = strrchr(a->s->mesh, '.'), *own = dot && !strcasecmp(dot, ".obj") ? "obj" : "ply";
+    return npg_exporters_choose(&a->choice, a->s->forms && a->s->forms[0] ? a->s->forms : own, NULL);
+}
+
+/* What they may know; the box is that of the mesh where it lies on the reference. */
+static npg_status begin_formats(applying *a)
+{
+    const npg_mesh *mesh = a->carried;
+    npg_export_facts *f = &a->facts;
+    npg_bounds bounds = npg_bounds_empty();
+    float *rest = npg_arena_copy(&a->arena, mesh->vert_pos, mesh->vert_count, 3 * sizeof *rest);
+    bool is_finer = a->s->fps_scale > 1;
+    if (!a->choice.chosen[0]) return NPG_OK;
+    NPG_TRY(npg_arena_status(&a->arena));
+    npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
+    for (size_t i = 0; i < 3 * mesh->vert_count; i++)
+        rest[i] = (float)((double)rest[i] + a->origin.world[i % 3]);
+    f->output = a->s->output;
+    f->prefix = a->s->prefix;
+    f->width = a->names.width;
+    f->vert_count = mesh->vert_count;
+    f->face_count = mesh->face_count;
+    f->faces = mesh->faces;
+    f->rest = rest;
+    f->colours = mesh->vert_colours;
+    f->uvs = mesh->vert_uvs;
+    f->corner_uvs = mesh->corner_uvs;
+    f->has_normals = a->turns_normals;
+    f->first_index = is_finer ? 0 : a->first_index;
+    f->last_index = is_finer ? (a->last_index - a->first_index) * a->s->fps_scale : a->last_index;
+    f->pose_count = is_finer ? f->last_index + 1 : (int64_t)a->frame_count;
+    f->fps = json_number_value(json_object_get(a->done, "fps")) * (double)a->s->fps_scale;
+    f->metres_per_unit = json_number_value(json_object_get(a->done, "metres_per_unit"));
+    f->is_z_up = !strcmp(option_of(a, "up"), "z");
+    f->voxel_share = strtod(option_of(a, "vdb-voxel"), NULL);
+    f->diagonal = npg_bounds_diagonal(&bounds);
+    for (int k = 0; k < 3; k++) {
+        f->longest = fmax(f->longest, bounds.hi[k] - bounds.lo[k]);
+        f->largest = fmax(f->largest, fmax(fabs(bounds.lo[k] + a->origin.world[k]),
+                                           fabs(bounds.hi[k] + a->origin.world[k])));
+    }
+    return npg_exporters_begin(&a->pass);
 }
 
 /* ---- writing ---- */
 
-/* The carried mesh as it is when the reference's vertices are at vert_pos. */
-static npg_status write_pose(applying *a, const float *vert_pos, int64_t number)
+/* The mesh in its place, into the sequence. */
+static npg_status write_mesh(applying *a, int64_t number)
 {
     char name[NPG_MESH_NAME_SIZE], path[NPG_PATH_SIZE];
     const npg_mesh *mesh = a->carried;
-    NPG_TRY(npg_attach_move(a->attachment, vert_pos, a->pos, a->turns_normals ? a->normals : NULL));
-    if (!a->turns_normals && a->normals) {
-        for (size_t i = 0; i < 3 * mesh->vert_count; i++) a->pos_float[i] = (float)a->pos[i];
-        npg_mesh_vertex_normals(a->normals, a->pos_float, mesh->vert_count, mesh->faces, mesh->face_count);
-    }
-    for (size_t i = 0; i < 3 * mesh->vert_count; i++) a->pos[i] += a->origin.world[i % 3];
     npg_mesh_view view = {.vert_count = mesh->vert_count,
                           .face_count = mesh->face_count,
                           .vert_world = a->pos,
@@ -226,9 +270,31 @@ static npg_status write_pose(applying *a, const float *vert_pos, int64_t number)
     npg_mesh_name(name, &a->names, number);
     NPG_TRY(npg_path_of(path, a->s->output, name));
     NPG_TRY(a->is_like ? npg_write_obj_like(path, a->s->mesh, &view) : npg_write_mesh(path, &view));
-    NPG_TRY(npg_done_add(a->files, a->s->output, name));
+    return npg_done_add(a->files, a->s->output, name);
+}
+
+/* The carried mesh as it is when the reference's vertices are at vert_pos. */
+static npg_status write_pose(applying *a, const float *vert_pos, int64_t index, int64_t number)
+{
+    const npg_mesh *mesh = a->carried;
+    if (a->choice.chosen[0]) NPG_TRY(npg_exporters_repeat(&a->pass, index));
+    NPG_TRY(npg_attach_move(a->attachment, vert_pos, a->pos, a->turns_normals ? a->normals : NULL));
+    if (!a->turns_normals && a->normals) {
+        for (size_t i = 0; i < 3 * mesh->vert_count; i++) a->pos_float[i] = (float)a->pos[i];
+        npg_mesh_vertex_normals(a->normals, a->pos_float, mesh->vert_count, mesh->faces, mesh->face_count);
+    }
+    for (size_t i = 0; i < 3 * mesh->vert_count; i++) {
+        a->pos[i] += a->origin.world[i % 3];
+        a->pos_world[i] = (float)a->pos[i];
+    }
     a->applied->frames++;
-    return NPG_OK;
+    if (a->choice.has_sequence) NPG_TRY(write_mesh(a, number));
+    if (!a->choice.chosen[0]) return NPG_OK;
+    const npg_pose pose = {.index = index,
+                           .number = number,
+                           .pos = a->pos_world,
+                           .normals = a->turns_normals ? a->normals : NULL};
+    return npg_exporters_pose(&a->pass, &pose);
 }
 
 /* ---- time ---- */
@@ -262,12 +328,12 @@ static npg_status write_step(applying *a)
     const moment *from = &a->window[1], *to = &a->window[2];
     int64_t scale = a->s->fps_scale, first = (from->index - a->first_index) * scale;
     if (!from->is_there) return NPG_OK;
-    NPG_TRY(write_pose(a, from->vert_pos, scale > 1 ? first : from->number));
+    NPG_TRY(write_pose(a, from->vert_pos, scale > 1 ? first : from->index, scale > 1 ? first : from->number));
     if (!to->is_there || scale == 1) return NPG_OK;
     int64_t steps = (to->index - from->index) * scale;
     for (int64_t k = 1; k < steps; k++) {
         make_curve(a, (double)k / (double)steps);
-        NPG_TRY(write_pose(a, a->between, first + k));
+        NPG_TRY(write_pose(a, a->between, first + k, first + k));
     }
     return NPG_OK;
 }
@@ -299,15 +365,19 @@ static npg_status write_done(applying *a)
         shift_window(a);
         NPG_TRY(write_step(a));
     }
+    if (a->choice.chosen[0]) {
+        NPG_TRY(npg_exporters_finish(&a->pass));
+        NPG_TRY(npg_done_add_exports(a->files, a->s->output));
+    }
     json_t *facts =
         json_pack("{ss sI sI sI sf si so so}", "neupig", npg_version(), "frames", (json_int_t)a->frame_count,
                   "fps_scale", (json_int_t)a->s->fps_scale, "points_far", (json_int_t)a->applied->far_count,
-                  "fps", a->fps * (double)a->s->fps_scale, "exit_code",
-                  npg_status_exit_code(a->applied->far_count ? NPG_PARTIAL : NPG_OK), "job",
+                  "fps", json_number_value(json_object_get(a->done, "fps")) * (double)a->s->fps_scale,
+                  "exit_code", npg_status_exit_code(a->applied->far_count ? NPG_PARTIAL : NPG_OK), "job",
                   npg_json_text(a->s->job), "mesh", npg_json_text(a->s->mesh));
     npg_status status = npg_done_write(a->s->output, facts, a->files);
     json_decref(facts);
-    return status;
+    return status ? status : npg_file_remove(a->s->output, NPG_EXPORT_LIST_NAME);
 }
 
 static npg_status apply(applying *a)
@@ -316,9 +386,11 @@ static npg_status apply(applying *a)
     if (!a->s->output[0]) return npg_error(NPG_USAGE, "no output folder; say where with -o OUT");
     if (!a->s->prefix[0] || strchr(a->s->prefix, '/') || strlen(a->s->prefix) > 100)
         return npg_error(NPG_USAGE, "option prefix: \"%s\" can't begin a file's name", a->s->prefix);
+    NPG_TRY(choose(a));
     NPG_TRY(open_job(a));
     NPG_TRY(open_carried(a));
     NPG_TRY(open_output(a));
+    NPG_TRY(begin_formats(a));
     NPG_TRY(npg_json_lines(a->s->job, "frames.jsonl", -1, visit_frame, a));
     return write_done(a);
 }
@@ -333,7 +405,10 @@ npg_status npg_apply(npg_applied *applied, const npg_apply_settings *settings)
     if (!own.prefix) own.prefix = "frame";
     if (own.fps_scale < 1) own.fps_scale = 1;
     applying a = {.s = &own, .applied = &found, .files = json_array(), .arena = {.purpose = NPG_FOR_MESH}};
+    a.pass = (npg_exporters_pass){.choice = &a.choice, .facts = &a.facts};
     npg_status status = apply(&a);
+    npg_exporters_end(&a.pass);
+    json_decref(a.done);
     json_decref(a.files);
     npg_attach_close(&a.attachment);
     npg_mesh_unref(&a.reference);

@@ -59,7 +59,7 @@ static npg_status read_options(npg_worker *worker)
     NPG_TRY(npg_placement_parse(&state->map, state->axes));
     state->map.scale = state->scale;
     NPG_TRY(check_prefix(state->facts.prefix));
-    NPG_TRY(npg_exporters_choose(&state->choice, state->exports));
+    NPG_TRY(npg_exporters_choose(&state->choice, state->exports, NULL));
     if (reference[0]) format = npg_reader_for(reference);
     /* the user's own reference where it is OBJ: its lines are kept in OBJ files */
     state->facts.like = format && !strcmp(format, "obj") ? reference : NULL;
@@ -171,9 +171,10 @@ static npg_export_facts *export_facts(const npg_worker *worker)
     f->metres_per_unit = metres_per_unit[state->unit];
     f->is_z_up = state->up;
     if (!(box->scale > 0)) return f;
-    f->largest = npg_place_largest(&state->map, box);
-    f->diagonal = state->scale * box->diagonal;
-    f->longest = state->scale * 2 * NPG_UNIT_EXTENT / box->scale;
+    /* as float they come back from done.json as they are: what is exported later has the same bytes */
+    f->largest = (double)(float)npg_place_largest(&state->map, box);
+    f->diagonal = (double)(float)(state->scale * box->diagonal);
+    f->longest = (double)(float)(state->scale * 2 * NPG_UNIT_EXTENT / box->scale);
     return f;
 }
 
@@ -366,6 +367,7 @@ static npg_status write_exports(npg_worker *worker)
     if (!state->faces) NPG_TRY(begin_meshes(worker));
     npg_export_facts *facts = export_facts(worker);
     npg_status status = place_reference(worker, facts);
+    if (!status) status = npg_exporters_clear(facts->output);
     if (!status && facts->has_pose_colours && npg_exporters_has(&state->choice, "glb"))
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "motion.glb has the reference's colours: morph targets of colours are an option of "
@@ -410,21 +412,37 @@ static npg_status conclude(npg_worker *worker)
                   npg_json_at(whole, "stages.evaluate.verdict"), "meshes",
                   json_object_get(npg_worker_report(worker), "meshes"));
     report_settings(head, state);
+    const npg_export_facts *facts = export_facts(worker);
+    json_object_set_new(head, "box",
+                        json_pack("{sf sf sf}", "diagonal", facts->diagonal, "longest", facts->longest,
+                                  "largest", facts->largest));
     json_object_set_new(head, "options", npg_options_json(npg_worker_options(worker), NULL));
     npg_status status = npg_done_end(output, head, state->choice.chosen[0]);
     json_decref(head);
     return status ? status : npg_job_end(npg_job_of(worker));
 }
 
+/* A run that was done before: what was not asked for then. */
+static npg_status write_more(npg_worker *worker)
+{
+    const export_state *state = npg_worker_state(worker);
+    npg_exported made = {.struct_size = sizeof made};
+    NPG_TRY(read_options(worker));
+    npg_status status = npg_export_locked(&made, output_of(worker), state->exports);
+    if (!status && made.files)
+        npg_worker_log(worker, NPG_LOG_INFO, -1, "%zu files more are exported", made.files);
+    return status;
+}
+
 /* ---- the stage ---- */
 
 static npg_status check_own(const npg_worker *worker)
 {
-    static const char *const names[] = {"meshes", "obj", "volumes"};
     npg_status status = NPG_OK;
-    for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++) {
+    for (int i = -1; (i < 0 || npg_exporters[i]) && !status; i++) {
         char folder[NPG_PATH_SIZE];
-        NPG_TRY(npg_path_of(folder, output_of(worker), names[i]));
+        if (i >= 0 && !npg_exporters[i]->folder) continue;
+        NPG_TRY(npg_path_of(folder, output_of(worker), i < 0 ? "meshes" : npg_exporters[i]->folder));
         status = npg_folder_is_own(folder);
     }
     return status;
@@ -527,4 +545,5 @@ const npg_stage npg_stage_export = {.name = "export",
                                     .flush = flush,
                                     .uninit = uninit,
                                     .memory = memory,
+                                    .again = write_more,
                                     .conclude = conclude};

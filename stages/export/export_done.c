@@ -19,9 +19,11 @@ static npg_status add_line(void *user, const json_t *object, const char *line, s
     json_t *name = json_object_get(object, "file");
     (void)line, (void)size;
     if (json_is_string(name))
-        json_array_append_new(user,
-                              json_pack("{sO sO sO}", "path", name, "bytes", json_object_get(object, "bytes"),
-                                        "xxh3", json_object_get(object, "xxh3")));
+        json_array_append_new(
+            user, json_pack("{sO sO sO sO* sO* sO*}", "path", name, "bytes", json_object_get(object, "bytes"),
+                            "xxh3", json_object_get(object, "xxh3"), "form", json_object_get(object, "form"),
+                            "first", json_object_get(object, "first"), "frames",
+                            json_object_get(object, "frames")));
     return NPG_OK;
 }
 
@@ -53,14 +55,17 @@ npg_status npg_done_write(const char *output, const json_t *head, const json_t *
     return status;
 }
 
+npg_status npg_done_add_exports(json_t *files, const char *output)
+{
+    return npg_json_lines(output, NPG_EXPORT_LIST_NAME, -1, add_line, files);
+}
+
 static npg_status list_files(json_t *files, const char *output, bool has_exports)
 {
     static const char *const names[] = {"reference.ply", "frames.jsonl", "report.json"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) NPG_TRY(npg_done_add(files, output, names[i]));
     NPG_TRY(npg_json_lines(output, "frames.jsonl", -1, add_line, files));
-    if (!has_exports) return NPG_OK;
-    NPG_TRY(npg_done_add(files, output, "exports.jsonl"));
-    return npg_json_lines(output, "exports.jsonl", -1, add_line, files);
+    return has_exports ? npg_done_add_exports(files, output) : NPG_OK;
 }
 
 /* The frame log is what an interrupted run is resumed from: it goes when nothing is left to resume. */
@@ -70,5 +75,6 @@ npg_status npg_done_end(const char *output, const json_t *head, bool has_exports
     npg_status status = list_files(files, output, has_exports);
     if (!status) status = npg_done_write(output, head, files);
     json_decref(files);
+    if (!status) status = npg_file_remove(output, NPG_EXPORT_LIST_NAME);
     return status ? status : npg_file_remove(output, NPG_FRAME_LOG_NAME);
 }

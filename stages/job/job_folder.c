@@ -231,7 +231,7 @@ static npg_status choose_start(npg_job *job, npg_job_start *start, npg_worker *w
                                bool append)
 {
     int64_t added, planned;
-    npg_status status = npg_job_compare(&added, job->then, job->now);
+    npg_status status = npg_job_compare(&added, job->then, job->now, is_done);
     if (status == NPG_USAGE) return npg_worker_refuse_job(worker);
     NPG_TRY(status);
     *start = is_done ? NPG_JOB_DONE : NPG_JOB_RESUME;

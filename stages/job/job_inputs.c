@@ -149,15 +149,15 @@ static const char *source_of(const json_t *description)
     return source[0] ? source : source_words[NPG_JOB_FILES];
 }
 
-static npg_status compare_options(const json_t *then, const json_t *now)
+static npg_status compare_options(const json_t *then, const json_t *now, bool is_done)
 {
     const char *name;
     const json_t *value;
     json_object_foreach((json_t *)now, name, value)
     {
         const char *was = text_of(then, name), *is = text_of(now, name);
-        if (!strncmp(name, "follow-end.", 11))
-            continue; /* what ends a live source is kept for npg_options_load_job() */
+        if (!strncmp(name, "follow-end.", 11) || (is_done && !strcmp(name, "export")))
+            continue; /* what ends a live source is kept for npg_options_load_job(); more can be exported */
         if (!json_object_get(then, name))
             return npg_error(NPG_USAGE, "option %s is new and is \"%s\"", name, is);
         if (strcmp(was, is) != 0)
@@ -194,7 +194,7 @@ static npg_status compare_frames(int64_t *added, const json_t *then, const json_
     return NPG_OK;
 }
 
-npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now)
+npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now, bool is_done)
 {
     *added = 0;
     if (strcmp(text_of(then, "neupig"), text_of(now, "neupig")) != 0)
@@ -204,7 +204,7 @@ npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now
         return npg_error(NPG_USAGE,
                          "its frames come from another kind of source (%s) than they came from (%s)",
                          source_of(now), source_of(then));
-    NPG_TRY(compare_options(json_object_get(then, "options"), json_object_get(now, "options")));
+    NPG_TRY(compare_options(json_object_get(then, "options"), json_object_get(now, "options"), is_done));
     const json_t *own_then = json_object_get(then, "custom_stages"),
                  *own_now = json_object_get(now, "custom_stages");
     if ((json_array_size(own_then) || json_array_size(own_now)) && !json_equal(own_then, own_now))

@@ -89,9 +89,9 @@ npg_status npg_job_describe(json_t **description, const npg_options *options);
 /* The checksums of its frames, for stage ingest (npg_fact_input_hashes); of files alone. */
 npg_status npg_job_publish_hashes(npg_worker *worker, const npg_job *job);
 
-/* NPG_OK when both describe the same; *added gets the number of frames that `now` has more at its end.
- * NPG_USAGE says what differs first. */
-npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now);
+/* NPG_OK when both describe the same; *added gets the number of frames that `now` has more at its end.  What is
+ * done may be asked for other exports.  NPG_USAGE says what differs first. */
+npg_status npg_job_compare(int64_t *added, const json_t *then, const json_t *now, bool is_done);
 
 /* State mesh: the reference mesh as blocks of a state on disk. */
 

@@ -115,7 +115,7 @@ provide_mesh() {
     local key
     [ ! -e scan.obj ] || return 0
     key=$(sed -n 's/^{"index":[0-9]*,"number":\([0-9]*\),.*"key":true,.*/\1/p' out/frames.jsonl)
-    neupig apply out --mesh out/reference.ply --format obj -o carried.obj >/dev/null
+    neupig apply out --mesh out/reference.ply --export obj -o carried.obj >/dev/null
     cp "carried.obj/frame_$(printf %04d "$key").obj" scan.obj
     cp scan.obj my-model.obj
     rm -r carried.obj

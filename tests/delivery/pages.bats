@@ -92,7 +92,7 @@ copy_tree() { # FOLDER
 }
 
 @test "every option that a page names is one of the command or of a script" {
-    for verb in run batch append apply probe eval synth render view bench doctor man; do "$NEUPIG" help $verb --help-all; done >known
+    for verb in run batch append export apply probe eval synth render view bench doctor man; do "$NEUPIG" help $verb --help-all; done >known
     "$NEUPIG-bodies" 2>>known || true
     for script in explore plot_explore figures rig_json; do "$root/tools/$script.py" --help; done >>known
     # of CMake, CTest, pip, bats and others

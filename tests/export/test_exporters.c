@@ -88,7 +88,7 @@ static npg_export_facts facts_of(const char *out)
 static npg_status write_list(const char *list, npg_export_facts *facts, npg_export_watch *watch)
 {
     npg_export_choice choice;
-    NPG_TRY(npg_exporters_choose(&choice, list));
+    NPG_TRY(npg_exporters_choose(&choice, list, NULL));
     return npg_exporters_write(&choice, facts, watch);
 }
 
@@ -131,18 +131,25 @@ static void the_list_says_what_is_made(void **state)
 {
     npg_export_choice choice;
     (void)state;
-    assert_int_equal(npg_exporters_choose(&choice, ""), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "", NULL), NPG_OK);
     assert_false(choice.is_obj);
     assert_false(choice.chosen[0]);
-    assert_int_equal(npg_exporters_choose(&choice, "obj"), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "obj", NULL), NPG_OK);
     assert_true(choice.is_obj); /* alone it is the sequence itself */
     assert_false(choice.chosen[0]);
-    assert_int_equal(npg_exporters_choose(&choice, "obj,ply"), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "obj,ply", NULL), NPG_OK);
     assert_false(choice.is_obj);
     assert_true(choice.chosen[0]);
     json_t *names = npg_exporters_json(&choice);
     assert_int_equal(json_array_size(names), 2);
     json_decref(names);
+    assert_int_equal(npg_exporters_choose(&choice, "glb,ply", "obj"), NPG_OK); /* of a run that wrote OBJ */
+    assert_true(choice.is_obj && choice.has_sequence);
+    char *list = npg_exporters_list(&choice);
+    assert_string_equal(list, "obj,ply,glb");
+    free(list);
+    assert_int_equal(npg_exporters_choose(&choice, "glb", NULL), NPG_OK);
+    assert_false(choice.has_sequence);
 }
 
 static void what_is_no_form_is_refused(void **state)
@@ -151,7 +158,7 @@ static void what_is_no_form_is_refused(void **state)
     npg_export_choice choice;
     (void)state;
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
-        assert_int_equal(npg_exporters_choose(&choice, lists[i]), NPG_USAGE);
+        assert_int_equal(npg_exporters_choose(&choice, lists[i], NULL), NPG_USAGE);
         assert_non_null(strstr(npg_error_text(), "is none of ply, obj, pc2"));
     }
 }
@@ -162,8 +169,12 @@ static void what_a_form_can_not_hold_is_refused(void **state)
     npg_export_choice choice;
     (void)state;
     facts.pose_count = 10;
-    assert_int_equal(npg_exporters_choose(&choice, "pc2,mdd,glb,usda,npz,vdb"), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "pc2,mdd,glb,usda,npz,vdb", NULL), NPG_OK);
     assert_int_equal(npg_exporters_check(&choice, &facts), NPG_OK);
+    facts.face_count = 0;
+    assert_int_equal(npg_exporters_check(&choice, &facts), NPG_USAGE);
+    assert_non_null(strstr(npg_error_text(), "points without faces"));
+    facts.face_count = F;
     facts.largest = 51; /* more than 16.8 diagonals */
     assert_int_equal(npg_exporters_check(&choice, &facts), NPG_USAGE);
     assert_non_null(strstr(npg_error_text(), "centre"));
@@ -173,14 +184,14 @@ static void what_a_form_can_not_hold_is_refused(void **state)
     assert_non_null(strstr(npg_error_text(), "frames in 31 bits"));
     facts.pose_count = 10;
     facts.vert_count = (size_t)1 << 31;
-    assert_int_equal(npg_exporters_choose(&choice, "glb"), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "glb", NULL), NPG_OK);
     assert_int_equal(npg_exporters_check(&choice, &facts), NPG_USAGE);
     assert_non_null(strstr(npg_error_text(), "glb"));
     facts.pose_count = -1; /* a live source: nothing is known, nothing is refused */
     facts.vert_count = V;
     facts.face_count = F;
     facts.largest = facts.diagonal = 0;
-    assert_int_equal(npg_exporters_choose(&choice, "pc2,mdd,glb,usda,npz,vdb"), NPG_OK);
+    assert_int_equal(npg_exporters_choose(&choice, "pc2,mdd,glb,usda,npz,vdb", NULL), NPG_OK);
     assert_int_equal(npg_exporters_check(&choice, &facts), NPG_OK);
     assert_int_equal(npg_exporters_bytes(&choice, &facts), 0);
 }
@@ -413,8 +424,8 @@ static void a_changed_mesh_is_noticed(void **state)
     assert_int_equal(npg_write_ply(in_folder(&folder, "changed/meshes/frame_0012.ply"), &view), NPG_OK);
     assert_int_equal(write_list("pc2,mdd,glb,usda,npz,vdb", &facts, &watch), NPG_BAD_INPUT);
     assert_non_null(strstr(npg_error_text(), "frame_0012.ply was changed"));
-    const char *const names[] = {"motion.pc2", "motion.mdd",       "motion.glb",   "motion.usda",
-                                 "motion.npz", ".motion.npz.part", "exports.jsonl"};
+    const char *const names[] = {"motion.pc2", "motion.mdd",       "motion.glb",           "motion.usda",
+                                 "motion.npz", ".motion.npz.part", "exports.partial.jsonl"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) assert_false(is_there(out, names[i]));
 }
 
@@ -455,7 +466,7 @@ static void a_full_disk_is_said(void **state)
         assert_int_equal(waitpid(child, &status, 0), child);
         assert_true(WIFEXITED(status));
         assert_int_equal(WEXITSTATUS(status), 5);
-        assert_false(is_there(out, "exports.jsonl"));
+        assert_false(is_there(out, "exports.partial.jsonl"));
     }
 }
 
@@ -564,7 +575,7 @@ static void no_memory_leaves_no_list(void **state)
         status = write_list("ply,obj,pc2,mdd,glb,usda,npz,vdb", &facts, &watch);
         npg_memory_fail_at(0, false);
         assert_true(status == NPG_OK || status == NPG_MEMORY);
-        assert_int_equal(is_there(out, "exports.jsonl"), status == NPG_OK);
+        assert_int_equal(is_there(out, "exports.partial.jsonl"), status == NPG_OK);
         assert_int_equal(npg_memory_used(), before);
     }
     assert_int_equal(status, NPG_OK);
@@ -588,7 +599,7 @@ static void clearing_leaves_what_is_not_ours(void **state)
     for (size_t i = 0; i < 5; i++) assert_true(is_there(out, mine[i]));
     assert_false(is_there(out, "motion.glb"));
     assert_false(is_there(out, "reference.obj"));
-    assert_false(is_there(out, "exports.jsonl"));
+    assert_false(is_there(out, "exports.partial.jsonl"));
     assert_false(is_there(out, "obj/frame_0010.obj"));
     assert_false(is_there(out, "volumes/frame_0010.vdb"));
 }

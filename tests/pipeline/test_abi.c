@@ -86,6 +86,9 @@ static const layout layouts[] = {AT(npg_allocator, user, 8),
                                  AT(npg_progress, windows, 80),
                                  AT(npg_progress, loss, 88),
                                  SIZE(npg_progress, 96),
+                                 AT(npg_exported, files, 8),
+                                 AT(npg_exported, repeated, 16),
+                                 SIZE(npg_exported, 24),
                                  AT(npg_hooks, user, 8),
                                  AT(npg_hooks, log, 16),
                                  AT(npg_hooks, progress, 24),
@@ -125,7 +128,7 @@ static const layout layouts[] = {AT(npg_allocator, user, 8),
                                  AT(npg_eval_settings, frame, 72),
                                  SIZE(npg_eval_settings, 80),
                                  AT(npg_apply_settings, job, 8),
-                                 AT(npg_apply_settings, ending, 40),
+                                 AT(npg_apply_settings, forms, 40),
                                  AT(npg_apply_settings, fps_scale, 48),
                                  AT(npg_apply_settings, overwrite, 64),
                                  SIZE(npg_apply_settings, 72),
@@ -360,6 +363,12 @@ static void results_that_are_not_there(void **state)
     assert_int_equal(npg_apply(&applied, &apply), NPG_USAGE);
     apply.mesh = NULL;
     assert_int_equal(npg_apply(&applied, &apply), NPG_USAGE);
+
+    npg_exported exported = {.struct_size = sizeof exported};
+    assert_int_equal(npg_export(NULL, "/nowhere", "glb"), NPG_USAGE);
+    assert_int_equal(npg_export(&exported, NULL, "glb"), NPG_USAGE);
+    assert_int_equal(npg_export(&exported, "/nowhere", NULL), NPG_USAGE);
+    assert_int_equal(npg_export(&exported, "/nowhere", "glb"), NPG_USAGE);
 
     npg_verified verified = {.struct_size = sizeof verified};
     assert_int_equal(npg_verify(&verified, NULL, NULL, NULL), NPG_USAGE);

@@ -116,14 +116,14 @@ lines_of() {
 @test "in-between frames are nearer the truth than lines between meshes, and nothing leaps" {
     fine_and_coarse
     between_run wide
-    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-curves --fps-scale 2 --format obj
+    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-curves --fps-scale 2 --export obj
     lines_of wide-curves wide-line
     curves=$(odd_error wide-curves fine)
     line=$(odd_error wide-line fine)
     echo "curves $curves, lines $line"
     awk -v w="$curves" -v l="$line" 'BEGIN { exit !(w > 0 && w < 0.95 * l) }'
     # nothing leaps where windows meet: a step of a 16th of a frame is never much longer than those beside it
-    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-steps --fps-scale 16 --format obj
+    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-steps --fps-scale 16 --export obj
     for step in wide-steps/*.obj; do grep '^v ' "$step" | awk '{ print $2, $3, $4 }' >"$step.v"; done
     for k in $(seq 0 127); do
         paste "$(printf wide-steps/frame_%04d.obj.v "$k")" "$(printf wide-steps/frame_%04d.obj.v $((k + 1)))" |
@@ -154,7 +154,7 @@ lines_of() {
     grep -q '^vt 0 1$' curve-out/step_0004.obj
     [ "$(grep -c '^vn' curve-out/step_0004.obj)" -eq 3 ]
     grep -q '^v .* 0 1 0$' curve-out/step_0004.obj
-    "$NEUPIG" apply curve --mesh three.obj -o curve-ply --format ply
+    "$NEUPIG" apply curve --mesh three.obj -o curve-ply --export ply
     sed '/^end_header/q' curve-ply/frame_0003.ply >header
     grep -q 'property uchar red' header
     grep -q 'property float s' header
@@ -191,7 +191,7 @@ lines_of() {
     rm -rf still
     hand_made still 0
     printf '0.1 0.1 0 0 0 -1\n0.2 0.2 -0.05 0.6 0.8 0\n' >markers.xyzn
-    "$NEUPIG" apply still --mesh markers.xyzn -o markers --format obj
+    "$NEUPIG" apply still --mesh markers.xyzn -o markers --export obj
     grep -q '^vn 0.60* 0.80* ' markers/frame_0000.obj
     ! grep -q '^f' markers/frame_0000.obj
 }

@@ -2,15 +2,17 @@
 #include "export/exporters/exporters_internal.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define FLOAT_STEPS 16777216 /* 2^24: float rounds by at most 1 / this of the largest coordinate */
 #define KEPT_SHARE  1e-6     /* of the box: what positions may lose, a micrometre in a metre */
 
-extern const npg_exporter npg_exporter_obj, npg_exporter_pc2, npg_exporter_mdd, npg_exporter_glb,
-    npg_exporter_usda, npg_exporter_npz, npg_exporter_vdb;
+extern const npg_exporter npg_exporter_ply, npg_exporter_obj, npg_exporter_pc2, npg_exporter_mdd,
+    npg_exporter_glb, npg_exporter_usda, npg_exporter_npz, npg_exporter_vdb;
 
-const npg_exporter *const npg_exporters[] = {&npg_exporter_obj,  /* beside PLY                           */
+const npg_exporter *const npg_exporters[] = {&npg_exporter_ply,  /* beside OBJ                           */
+                                             &npg_exporter_obj,  /* beside PLY                           */
                                              &npg_exporter_pc2,  /* 3ds Max, Blender, Marvelous Designer */
                                              &npg_exporter_mdd,  /* LightWave, Blender, three.js         */
                                              &npg_exporter_glb,  /* the web, Blender, Unreal             */
@@ -31,32 +33,31 @@ static int find_exporter(const char *name, size_t length)
 
 static npg_status refuse_name(const char *name, size_t length)
 {
-    char names[256] = "ply";
+    char names[256] = "";
     for (int i = 0; npg_exporters[i]; i++) {
         size_t used = strlen(names);
-        snprintf(names + used, sizeof names - used, ", %s", npg_exporters[i]->name);
+        snprintf(names + used, sizeof names - used, "%s%s", i ? ", " : "", npg_exporters[i]->name);
     }
     return npg_error(NPG_USAGE, "option export: \"%.*s\" is none of %s", (int)(length > 60 ? 60 : length),
                      name, names);
 }
 
-npg_status npg_exporters_choose(npg_export_choice *choice, const char *list)
+npg_status npg_exporters_choose(npg_export_choice *choice, const char *list, const char *sequence)
 {
-    bool has_ply = false, is_chosen[NPG_EXPORTERS_MAX] = {false};
-    int obj = find_exporter("obj", 3);
+    bool is_chosen[NPG_EXPORTERS_MAX] = {false};
+    int ply = find_exporter("ply", 3), obj = find_exporter("obj", 3);
     *choice = (npg_export_choice){0};
     for (const char *name = list; *name;) {
         size_t length = strcspn(name, ",");
         int at = find_exporter(name, length);
-        bool is_ply = length == 3 && !strncmp(name, "ply", 3);
-        if (at < 0 && !is_ply) return refuse_name(name, length);
-        has_ply = has_ply || is_ply;
-        if (at >= 0) is_chosen[at] = true;
+        if (at < 0) return refuse_name(name, length);
+        is_chosen[at] = true;
         name += length;
         if (*name == ',' && !*++name) return refuse_name(name, 0);
     }
-    choice->is_obj = !has_ply && is_chosen[obj];
-    is_chosen[obj] = has_ply && is_chosen[obj];
+    choice->has_sequence = is_chosen[ply] || is_chosen[obj];
+    choice->is_obj = sequence ? !strcmp(sequence, "obj") : !is_chosen[ply] && is_chosen[obj];
+    is_chosen[choice->is_obj ? obj : ply] = false;
     for (int i = 0, count = 0; npg_exporters[i]; i++)
         if (is_chosen[i]) choice->chosen[count++] = npg_exporters[i];
     return NPG_OK;
@@ -67,6 +68,16 @@ bool npg_exporters_has(const npg_export_choice *choice, const char *name)
     int i = 0;
     while (choice->chosen[i] && strcmp(choice->chosen[i]->name, name) != 0) i++;
     return choice->chosen[i];
+}
+
+char *npg_exporters_list(const npg_export_choice *choice)
+{
+    size_t size = 4;
+    for (int i = 0; choice->chosen[i]; i++) size += strlen(choice->chosen[i]->name) + 1;
+    char *list = malloc(size);
+    if (list) strcpy(list, choice->is_obj ? "obj" : "ply");
+    for (int i = 0; choice->chosen[i] && list; i++) strcat(strcat(list, ","), choice->chosen[i]->name);
+    return list;
 }
 
 json_t *npg_exporters_json(const npg_export_choice *choice)
@@ -95,6 +106,9 @@ static npg_status check_floats(const npg_exporter *exporter, const npg_export_fa
 npg_status npg_exporters_check(const npg_export_choice *choice, const npg_export_facts *facts)
 {
     for (int i = 0; choice->chosen[i]; i++) {
+        if (choice->chosen[i]->is_surface && !facts->face_count && facts->vert_count)
+            return npg_error(NPG_USAGE, "%s holds surfaces, and these are points without faces",
+                             choice->chosen[i]->name);
         if (choice->chosen[i]->is_float) NPG_TRY(check_floats(choice->chosen[i], facts));
         if (choice->chosen[i]->check) NPG_TRY(choice->chosen[i]->check(facts));
     }

@@ -4,9 +4,10 @@
  *     OUT/motion.glb                 glTF with morph targets; motion_000.glb and so on when it is long
  *     OUT/motion.usda                points as time samples
  *     OUT/motion.npz                 arrays for NumPy
- *     OUT/obj/<prefix>_0000.obj      a second sequence, where the first one is PLY
  *     OUT/volumes/<prefix>_0000.vdb  level set of every frame
- *     OUT/exports.jsonl              one line per file of these, with size and checksum
+ *     OUT/ply/, OUT/obj/             a second sequence
+ *     OUT/exports.partial.jsonl      while they are made, one line per file of these, with size and checksum; done.json
+ *                                    takes them over
  *
  * The mesh sequence is written while frames are solved, which is not the order of time, and is what a
  * resumed run continues.  The other formats are made from those files when all are there: one pass in the
@@ -50,7 +51,7 @@ typedef struct npg_export_facts {
     double largest, diagonal; /* coordinate, and of the box; 0: not known yet                */
     double longest;           /* side of the box                                             */
     double voxel_share;       /* a level set's voxel, in longest sides                       */
-    npg_file *list;           /* OUT/exports.jsonl, where files are noted                    */
+    npg_file *list;           /* where files are noted                                       */
 } npg_export_facts;
 
 typedef struct npg_pose {
@@ -74,6 +75,7 @@ typedef struct npg_exporter {
     const char *file;            /* all poses in one file of this name                                     */
     const char *folder, *ending; /* or one file a pose, <folder>/<prefix>_<number>.<ending> */
     bool is_float;       /* keeps positions as float: far from 0 that is too coarse                   */
+    bool is_surface;     /* has no points without faces                                               */
     bool with_reference; /* is of no use without OUT/reference.obj                                        */
     bool has_fixed_rate; /* has no times of its own: a frame without a mesh repeats the one before it */
     size_t state_size;
@@ -94,16 +96,21 @@ extern const npg_exporter *const npg_exporters[];
 
 typedef struct npg_export_choice {
     bool is_obj;                                   /* the sequence of the run itself is OBJ, else PLY */
+    bool has_sequence;                             /* the list names PLY or OBJ */
     const npg_exporter *chosen[NPG_EXPORTERS_MAX]; /* in the order of the table; NULL behind them */
 } npg_export_choice;
 
-/* list: "ply,glb,..." or "".  obj beside ply becomes a sequence of its own.  NPG_USAGE names what is no format. */
-npg_status npg_exporters_choose(npg_export_choice *choice, const char *list);
+/* list: "ply,glb,..." or "".  sequence: what the run's own is ("ply", "obj"), NULL: as the list says.  A second one
+ * becomes an exporter.  NPG_USAGE names what is no format. */
+npg_status npg_exporters_choose(npg_export_choice *choice, const char *list, const char *sequence);
 
 /* Whether the format of this name is made of the meshes. */
 bool npg_exporters_has(const npg_export_choice *choice, const char *name);
 
-/* Names of all that is made, the sequence first; a new array. */
+/* Names of all that is made, the sequence first, with commas between; to be given to free().  NULL: no memory. */
+char *npg_exporters_list(const npg_export_choice *choice);
+
+/* The same as a new array. */
 json_t *npg_exporters_json(const npg_export_choice *choice);
 
 /* NPG_USAGE when one of the formats can't hold the capture; the text says which and why. */
@@ -120,6 +127,9 @@ typedef struct npg_export_watch {
     int64_t repeated; /* out: frames without a mesh that formats of a fixed rate filled */
 } npg_export_watch;
 
+/* Whether something of this name in OUT is a format's. */
+bool npg_exporters_own(const char *name);
+
 /* Remove all that formats of earlier runs left in OUT. */
 npg_status npg_exporters_clear(const char *output);
 
@@ -128,6 +138,27 @@ npg_status npg_exporters_clear(const char *output);
  * can't hold what is there), NPG_STOPPED. */
 npg_status npg_exporters_write(const npg_export_choice *choice, npg_export_facts *facts,
                                npg_export_watch *watch);
+
+/* The same of poses that are at hand: begin, then for each repeat and pose, finish; end in any case. */
+typedef struct npg_exporters_pass {
+    const npg_export_choice *choice;
+    npg_export_facts *facts; /* all are known but list */
+    void *states[NPG_EXPORTERS_MAX];
+    npg_pose last;    /* a loan until the next pose */
+    int64_t repeated; /* out: see npg_export_watch  */
+} npg_exporters_pass;
+npg_status npg_exporters_begin(npg_exporters_pass *pass);
+
+/* Formats of a fixed rate show the last pose up to that before index; its arrays are still there. */
+npg_status npg_exporters_repeat(npg_exporters_pass *pass, int64_t index);
+npg_status npg_exporters_pose(npg_exporters_pass *pass, const npg_pose *pose);
+npg_status npg_exporters_finish(npg_exporters_pass *pass);
+void npg_exporters_end(npg_exporters_pass *pass);
+
+/* Lines of the files that were made: "form", "file", "first", "frames", "bytes", "xxh3".  The form of
+ * OUT/reference.obj, which all point caches share: */
+#define NPG_EXPORT_LIST_NAME "exports.partial.jsonl"
+#define NPG_EXPORT_REFERENCE "reference"
 
 /* A writer's word that OUT/<file> is in place with `pose_count` poses from index first on. */
 npg_status npg_export_made(const npg_export_facts *facts, const char *format, const char *file, int64_t first,
@@ -158,15 +189,27 @@ npg_status npg_done_add(json_t *files, const char *output, const char *name);
 /* OUT/done.json of what stands at its head, and the list of files. */
 npg_status npg_done_write(const char *output, const json_t *head, const json_t *files);
 
-/* The same with every file of a run, with has_exports those that OUT/exports.jsonl lists too; the frame log goes. */
+/* Add what OUT/NPG_EXPORT_LIST_NAME lists. */
+npg_status npg_done_add_exports(json_t *files, const char *output);
+
+/* The same with every file of a run, with has_exports what was exported, too; frame log and list of exports go. */
 npg_status npg_done_end(const char *output, const json_t *head, bool has_exports);
 
-/* ---- OBJ ---- */
+/* ---- a run that is done ---- */
 
-/* One pose of a capture (V x 3; normals may be NULL; colours V x 4, NULL: the reference's) as OBJ, with the
- * lines of facts->like where there is one. */
-npg_status npg_write_obj_pose(const char *path, const npg_export_facts *facts, const float *pos,
-                              const float *normals, const uint8_t *colours);
+/* NPG_USAGE, NPG_BAD_INPUT: job is no run, or is not done; the text says what `verb` needs.  *done is its done.json
+ * (json_decref). */
+npg_status npg_export_open_done(json_t **done, const char *job, const char *verb);
+
+/* npg_export() by one who has the job's lock. */
+npg_status npg_export_locked(npg_exported *made, const char *output, const char *list);
+
+/* ---- a pose as PLY or OBJ ---- */
+
+/* By the path's ending; V x 3, normals may be NULL, colours V x 4, NULL: the reference's.  OBJ with the lines of
+ * facts->like where there is one. */
+npg_status npg_write_pose(const char *path, const npg_export_facts *facts, const float *pos,
+                          const float *normals, const uint8_t *colours);
 
 /* ---- faces that close the openings of a surface ---- */
 

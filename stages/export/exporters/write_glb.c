@@ -488,6 +488,7 @@ static void close_glb(void *state)
 }
 
 const npg_exporter npg_exporter_glb = {.name = "glb",
+                                       .is_surface = true,
                                        .is_float = true,
                                        .state_size = sizeof(glb_state),
                                        .check = check_glb,

@@ -211,8 +211,8 @@ npg_status npg_write_obj_like(const char *path, const char *like, const npg_mesh
 
 /* ---- a pose, and the sequence ---- */
 
-npg_status npg_write_obj_pose(const char *path, const npg_export_facts *facts, const float *pos,
-                              const float *normals, const uint8_t *colours)
+npg_status npg_write_pose(const char *path, const npg_export_facts *facts, const float *pos,
+                          const float *normals, const uint8_t *colours)
 {
     double *world;
     NPG_TRY(npg_alloc_array(&world, NPG_FOR_FILES, facts->vert_count, 3 * sizeof *world));
@@ -225,8 +225,8 @@ npg_status npg_write_obj_pose(const char *path, const npg_export_facts *facts, c
                           .vert_colours = colours ? colours : facts->colours,
                           .vert_uvs = facts->uvs,
                           .turns_faces = facts->turns_faces};
-    npg_status status =
-        facts->like ? npg_write_obj_like(path, facts->like, &view) : npg_write_obj(path, &view);
+    bool is_like = facts->like && !strcmp(strrchr(path, '.'), ".obj");
+    npg_status status = is_like ? npg_write_obj_like(path, facts->like, &view) : npg_write_mesh(path, &view);
     npg_release(&world);
     return status;
 }
@@ -239,13 +239,19 @@ static uint64_t bytes(const npg_export_facts *facts)
 
 static npg_status write_pose(void *state, const npg_pose *pose)
 {
-    return npg_write_obj_pose(pose->path, ((npg_writer *)state)->facts, pose->pos, pose->normals,
-                              pose->colours);
+    return npg_write_pose(pose->path, ((npg_writer *)state)->facts, pose->pos, pose->normals, pose->colours);
 }
 
 const npg_exporter npg_exporter_obj = {.name = "obj",
                                        .folder = "obj",
                                        .ending = "obj",
+                                       .state_size = sizeof(npg_writer),
+                                       .bytes = bytes,
+                                       .pose = write_pose};
+
+const npg_exporter npg_exporter_ply = {.name = "ply",
+                                       .folder = "ply",
+                                       .ending = "ply",
                                        .state_size = sizeof(npg_writer),
                                        .bytes = bytes,
                                        .pose = write_pose};

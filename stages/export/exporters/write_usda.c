@@ -231,6 +231,7 @@ static void close_usda(void *state)
 }
 
 const npg_exporter npg_exporter_usda = {.name = "usda",
+                                        .is_surface = true,
                                         .file = "motion.usda",
                                         .is_float = true,
                                         .state_size = sizeof(usda_state),

@@ -59,6 +59,7 @@ static void close_vdb(void *state)
 }
 
 const npg_exporter npg_exporter_vdb = {.name = "vdb",
+                                       .is_surface = true,
                                        .folder = "volumes",
                                        .ending = "vdb",
                                        .state_size = sizeof(npg_vdb_surface),
