@@ -468,13 +468,21 @@ typedef enum npg_picture_colour {
     NPG_PICTURE_AUTO      /* a cloud's own where it has any, else plain                                  */
 } npg_picture_colour;
 
+/* Which way is up.  Downward ones are how cameras have it: then the front is where they stand. */
+typedef enum npg_up {
+    NPG_UP_Y,       /* the front is from +z */
+    NPG_UP_Z,       /* from -y */
+    NPG_UP_MINUS_Y, /* from -z */
+    NPG_UP_MINUS_Z  /* from +y */
+} npg_up;
+
 typedef struct npg_picture_settings {
     size_t struct_size;
     int64_t width, height;     /* of a tile, pixels; width 0: as what is drawn needs            */
     int64_t columns;           /* tiles in a row; 0: 8                                          */
     int64_t samples;           /* rays per pixel and axis; 0: 2                                 */
-    double azimuth, elevation; /* of the eye, degrees; azimuth 0: from the front (+z), 90: from +x */
-    int is_z_up;               /* then from the front is from -y                                */
+    double azimuth, elevation; /* of the eye, degrees; azimuth 0: from the front, 90: from +x   */
+    npg_up up;
     npg_picture_colour colour;
     double point_size; /* radius of a cloud's points, in diagonals */
 } npg_picture_settings;

@@ -11,6 +11,8 @@ typedef struct settings {
     double azimuth, elevation, point_size;
 } settings;
 
+enum { UP_AUTO = NPG_UP_MINUS_Z + 1 }; /* the last word of --up */
+
 #define AT(member) offsetof(settings, member)
 
 /* clang-format off */
@@ -29,11 +31,12 @@ const npg_option npg_render_options[] = {
     NPG_ROW_CHOICE("view",       AT(view),       "free",  "free|front|back|left|right|top|bottom",
         "Where to look from; free: --azimuth and --elevation"),
     NPG_ROW_REAL  ("azimuth",    AT(azimuth),    "25",    -3600, 3600, "DEGREES",
-        "Degrees around the upward axis; 0: from the front (+z, or -y with z up)"),
+        "Degrees around the upward axis; 0: from the front (+z, -y with z up; where up is minus, from the other side, "
+        "where cameras stand)"),
     NPG_ROW_REAL  ("elevation",  AT(elevation),  "12",    -90,   90,   "DEGREES",
         "Degrees above the horizon"),
-    NPG_ROW_CHOICE("up",         AT(up),         "y",     "y|z",
-        "The upward axis"),
+    NPG_ROW_CHOICE("up",         AT(up),         "auto",  "y|z|-y|-z|auto",
+        "The upward axis; auto: of a rig.json as its sensors stand, else y"),
     NPG_ROW_CHOICE("colour",     AT(colour),     "auto",  "plain|vertex|normal|identity|auto",
         "auto: clouds in their own colours, meshes plain; vertex: colours in the file; normal; "
         "identity: by place in the first file, to see vertices keep their place on the body"),
@@ -62,7 +65,15 @@ static npg_status list_files(npg_listing *files, const settings *s, const npg_cl
     return NPG_OK;
 }
 
-static npg_status draw(const npg_listing *files, const settings *s)
+/* As the sensors of a rig stand; else y. */
+static npg_status find_up(npg_up *up, const settings *s, const npg_listing *files)
+{
+    *up = s->up == UP_AUTO ? NPG_UP_Y : (npg_up)s->up;
+    if (s->up != UP_AUTO || !files->count || !npg_rig_is_frame(files->paths[0])) return NPG_OK;
+    return npg_rig_up_of(up, files->paths[0]);
+}
+
+static npg_status draw(const npg_listing *files, npg_up up, const settings *s)
 {
     /* as the words of --view */
     static const double angles[][2] = {{0, 0}, {0, 0}, {180, 0}, {-90, 0}, {90, 0}, {0, 90}, {0, -90}};
@@ -73,7 +84,7 @@ static npg_status draw(const npg_listing *files, const settings *s)
                                       .samples = s->samples,
                                       .azimuth = s->view ? angles[s->view][0] : s->azimuth,
                                       .elevation = s->view ? angles[s->view][1] : s->elevation,
-                                      .is_z_up = s->up,
+                                      .up = up,
                                       .colour = (npg_picture_colour)s->colour,
                                       .point_size = 0.01 * s->point_size};
     npg_picture picture = {.struct_size = sizeof picture};
@@ -88,8 +99,10 @@ static npg_status draw(const npg_listing *files, const settings *s)
 npg_status npg_verb_render(const npg_cli *cli)
 {
     npg_listing files = {.arena = &(npg_arena){.purpose = NPG_FOR_FILES}};
+    npg_up up;
     npg_status status = list_files(&files, cli->values, cli);
-    if (!status) status = draw(&files, cli->values);
+    if (!status) status = find_up(&up, cli->values, &files);
+    if (!status) status = draw(&files, up, cli->values);
     npg_arena_release(files.arena);
     return status;
 }

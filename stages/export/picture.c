@@ -204,11 +204,16 @@ static void turn_eye(camera *eye, const npg_picture_settings *s)
            e = fmin(fmax(s->elevation, -89.9), 89.9) * RADIANS; /* at 90 nothing is right of the eye */
     double back[3] = {sin(a) * cos(e), sin(e), cos(a) * cos(e)}, world_up[3] = {0, 1, 0};
     double *right = eye->axes, *above = eye->axes + 3, *ahead = eye->axes + 6;
-    if (s->is_z_up) {
-        double z_up[3] = {back[0], -back[2], back[1]};
+    double down = s->up == NPG_UP_MINUS_Y || s->up == NPG_UP_MINUS_Z ? -1 : 1; /* turned over about x */
+    for (int k = 1; k < 3; k++) {
+        back[k] *= down;
+        world_up[k] *= down;
+    }
+    if (s->up == NPG_UP_Z || s->up == NPG_UP_MINUS_Z) {
+        const double z_up[3] = {back[0], -back[2], back[1]};
         memcpy(back, z_up, sizeof back);
+        world_up[2] = world_up[1];
         world_up[1] = 0;
-        world_up[2] = 1;
     }
     for (int k = 0; k < 3; k++) ahead[k] = -back[k];
     npg_vec3_cross(right, ahead, world_up);

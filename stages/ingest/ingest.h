@@ -145,6 +145,10 @@ bool npg_rig_is(const char *path);
 npg_status npg_rig_open(npg_rig **rig, const char *path, const npg_rig_settings *settings);
 void npg_rig_close(npg_rig **rig);
 
+/* Which way its sensors have up, on average, as the nearest of y, z, -y and -z: that of the images, as cameras
+ * are seldom put up lying. */
+npg_up npg_rig_up(const npg_rig *rig);
+
 /* Place of a frame number; SIZE_MAX for one that is not there. */
 size_t npg_rig_find(const npg_rig *rig, int64_t number);
 
@@ -167,6 +171,9 @@ npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *o
  * rig that is there.  NPG_BAD_INPUT. */
 bool npg_rig_is_frame(const char *text);
 npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin);
+
+/* npg_rig_up() of the rig of such a frame. */
+npg_status npg_rig_up_of(npg_up *up, const char *text);
 
 /* A sensor's pose, by what it sees together with the others. */
 typedef enum npg_rig_verdict {

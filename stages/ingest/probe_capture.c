@@ -100,6 +100,10 @@ static const char *limit_of(const job *j)
                : NULL;
 }
 
+/* As words of render --up, and what `run --axes` then turns to y up. */
+static const char *const up_words[] = {"y", "z", "-y", "-z"};
+static const char *const up_axes[] = {"xyz", "xz-y", "x-y-z", "x-zy"};
+
 static void print_sensors(FILE *out, const job *j)
 {
     const npg_rig *rig = j->list ? j->list->rig : NULL;
@@ -116,6 +120,11 @@ static void print_sensors(FILE *out, const job *j)
     for (size_t s = 0; rig && j->views && rig->sensor_count > 1 && s < rig->sensor_count; s++)
         print_pose(out, j, s);
     if (limit_of(j)) fprintf(out, "limit     %s\n", limit_of(j));
+    if (!rig) return;
+    npg_up up = npg_rig_up(rig);
+    fprintf(out, "up        %s, as the sensors stand", up_words[up]);
+    if (up != NPG_UP_Y) fprintf(out, "; run --axes %s gives results with y up", up_axes[up]);
+    fputc('\n', out);
 }
 
 static json_t *json_of_sensors(const job *j)
@@ -159,6 +168,8 @@ static npg_status set_json(job *j)
         f->time_s, "per_frame", p->per_frame);
     if (j->views) json_object_set_new(all, "sensors", json_of_sensors(j));
     if (limit_of(j)) json_object_set_new(all, "limit", json_string(limit_of(j)));
+    if (j->list && j->list->rig)
+        json_object_set_new(all, "up", json_string(up_words[npg_rig_up(j->list->rig)]));
     char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
     npg_status status = text ? npg_copy_text((char **)&f->json, text) : npg_error(NPG_MEMORY, "no memory");
     free(text);

@@ -1,7 +1,8 @@
-/* Membrane fairing: Gauss and Seidel's sweeps over the unseen vertices, in their order. */
+/* Membrane: Gauss and Seidel's sweeps over the unseen vertices, in their order; and the second side of a shell. */
 #include "mesh/mesh_internal.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
@@ -124,6 +125,99 @@ npg_status npg_mesh_fair(npg_mesh *mesh, npg_faired *done, const float *points, 
     if (done->moved && empty) push_out(&m);
     for (size_t v = 0; v < n && done->moved; v++) done->pushed += m.kind[v] == PUSHED;
     npg_mesh_neighbours_close(&m.r);
+    npg_arena_release(&scratch);
+    return status;
+}
+
+/* ---- the second side of a shell ---- */
+
+/* back[v]: the vertex behind v, of a piece with a border; else UINT32_MAX.  *count: how many there are. */
+static npg_status number_backs(uint32_t *back, size_t *count, const npg_mesh *mesh, const uint32_t *twin)
+{
+    size_t n = mesh->vert_count;
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    uint32_t *piece = npg_arena_take(&scratch, n, sizeof *piece);
+    uint8_t *is_open = npg_arena_take(&scratch, n, 1);
+    npg_status status = npg_arena_status(&scratch);
+    size_t halves = status ? 0 : 3 * mesh->face_count;
+    for (size_t v = 0; v < n && !status; v++) piece[v] = (uint32_t)v;
+    for (size_t h = 0; h < halves; h++)
+        npg_set_join(piece, mesh->faces[h], mesh->faces[h - h % 3 + (h + 1) % 3]);
+    for (size_t h = 0; h < halves; h++)
+        if (twin[h] == UINT32_MAX) is_open[npg_set_root(piece, mesh->faces[h])] = 1;
+    for (size_t v = 0; v < n && !status; v++)
+        back[v] = is_open[npg_set_root(piece, (uint32_t)v)] ? (uint32_t)(n + (*count)++) : UINT32_MAX;
+    npg_arena_release(&scratch);
+    return status;
+}
+
+static void put_face(npg_mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
+{
+    const uint32_t face[3] = {a, b, c};
+    memcpy(mesh->faces + 3 * mesh->face_count++, face, sizeof face);
+}
+
+/* The faces of the second side, which look the other way, and a strip of two for each edge of the border. */
+static void add_backs(npg_mesh *out, const npg_mesh *mesh, const uint32_t *back, const uint32_t *twin)
+{
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        const uint32_t *v = mesh->faces + 3 * f;
+        if (back[v[0]] == UINT32_MAX) continue;
+        put_face(out, back[v[0]], back[v[2]], back[v[1]]);
+        for (size_t k = 0; k < 3; k++) {
+            uint32_t a = v[k], b = v[(k + 1) % 3];
+            if (twin[3 * f + k] != UINT32_MAX) continue;
+            put_face(out, b, a, back[a]);
+            put_face(out, b, back[a], back[b]);
+        }
+    }
+}
+
+static npg_status double_shell(npg_mesh **slot, const uint32_t *back, size_t back_count, const uint32_t *twin)
+{
+    npg_mesh *mesh = *slot, *out;
+    size_t borders = 0, faces = mesh->face_count;
+    for (size_t h = 0; h < 3 * faces; h++) borders += twin[h] == UINT32_MAX;
+    NPG_TRY(npg_mesh_open(&out, mesh->vert_count + back_count, 2 * (faces + borders)));
+    memcpy(out->vert_pos, mesh->vert_pos, mesh->vert_count * 3 * sizeof *out->vert_pos);
+    memcpy(out->faces, mesh->faces, faces * 3 * sizeof *out->faces);
+    for (size_t v = 0; v < mesh->vert_count; v++)
+        if (back[v] != UINT32_MAX)
+            memcpy(out->vert_pos + 3 * (size_t)back[v], mesh->vert_pos + 3 * v, 3 * sizeof *out->vert_pos);
+    out->face_count = faces;
+    add_backs(out, mesh, back, twin);
+    npg_mesh_unref(slot);
+    *slot = out;
+    return NPG_OK;
+}
+
+/* Draw the vertices from `first` on tight. */
+static npg_status draw_tight(npg_mesh *mesh, size_t first)
+{
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    moving m = {.mesh = mesh};
+    m.kind = npg_arena_take(&scratch, mesh->vert_count, sizeof *m.kind);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) memset(m.kind + first, MOVES, mesh->vert_count - first);
+    if (!status) status = npg_mesh_neighbours_open(&m.r, mesh);
+    if (!status) sweep(&m, SWEEPS_MOST, false);
+    npg_mesh_neighbours_close(&m.r);
+    npg_arena_release(&scratch);
+    return status;
+}
+
+npg_status npg_mesh_close(npg_mesh **mesh, size_t *added)
+{
+    npg_arena scratch = {.purpose = NPG_FOR_MESH};
+    size_t n = (*mesh)->vert_count;
+    uint32_t *back = npg_arena_take(&scratch, n, sizeof *back);
+    uint32_t *twin = npg_arena_take(&scratch, (*mesh)->face_count, 3 * sizeof *twin);
+    npg_status status = npg_arena_status(&scratch);
+    *added = 0;
+    if (!status) status = npg_mesh_twins(twin, (*mesh)->faces, (*mesh)->face_count);
+    if (!status) status = number_backs(back, added, *mesh, twin);
+    if (!status && *added) status = double_shell(mesh, back, *added, twin);
+    if (!status && *added) status = draw_tight(*mesh, n);
     npg_arena_release(&scratch);
     return status;
 }

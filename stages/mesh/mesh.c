@@ -40,10 +40,11 @@ static const npg_option mesh_options[] = {
         "after that bring it back to its points"),
     NPG_ROW_INT(    "faces",          AT(surface.face_max), "20000", 16, 1e8,  NULL,
         "Faces of the reference mesh at most. And no more than 4 per point"),
-    NPG_ROW_CHOICE( "unseen",         AT(surface.unseen),   "auto",  "auto|keep|trim",
+    NPG_ROW_CHOICE( "unseen",         AT(surface.unseen),   "auto",  "auto|keep|trim|close",
         "What becomes of surface that no frame saw. Holes, the far side of a single view: keep it as "
         "Poisson closed it, trim it, or draw it tight between what was seen, and trim it when it is more "
-        "than a quarter of the area (auto); it is reported in any case"),
+        "than a quarter of the area (auto); close: then give the shell that is left a back, drawn tight "
+        "from border to border. It is reported in any case, and no fault where it was asked for (close)"),
     NPG_PART(REAL,  "bars.invented",  AT(invented_max),     "10",    0,  100,  "PERCENT",
         "most of the reference's area that no point saw and that was kept, in per cent; of a given mesh: "
         "that no point of the keyframe is near, where its sensors could see it"),
@@ -191,7 +192,8 @@ static npg_status judge_invented(making *m)
     npg_mesh_note(m->worker, "invented_share", share);
     json_object_set_new(npg_worker_report(m->worker), "invented_at",
                         npg_unseen_place(&largest, box, place, sizeof place));
-    if (100 * share > m->state->invented_max) warn_of_invented(m, share, place);
+    if (100 * share > m->state->invented_max && m->state->surface.unseen != NPG_UNSEEN_CLOSE)
+        warn_of_invented(m, share, place);
     return NPG_OK;
 }
 
@@ -269,6 +271,29 @@ static npg_status colour_reference(making *m)
     return npg_colour_fill(mesh->vert_colours, mesh);
 }
 
+/* ---- a back for what is open ---- */
+
+/* The reference that is delivered; what is followed on the way to it is to show what it lacks. */
+static npg_status close_over(making *m)
+{
+    size_t added;
+    npg_mending mending;
+    bool is_last = npg_worker_pass(m->worker) == NPG_PASS_SOLVE;
+    if (!is_last || m->state->surface.unseen != NPG_UNSEEN_CLOSE ||
+        npg_worker_settings(m->worker)->reference[0])
+        return NPG_OK;
+    NPG_TRY(npg_mesh_close(&m->mesh, &added));
+    if (!added) return NPG_OK;
+    NPG_TRY(npg_mesh_decimate(&m->mesh, npg_face_budget(&m->state->surface, &m->set)));
+    NPG_TRY(npg_mesh_mend(&m->mesh, &mending));
+    NPG_TRY(npg_mesh_unseen(&m->invented_share, m->mesh, m->set.points, m->set.count, m->set.seen_dist));
+    json_object_set_new(npg_worker_report(m->worker), "unseen", json_string("closed"));
+    npg_mesh_warn(m->worker, false, m->key->number,
+                  "the reference is a shell: a back that nobody saw closes it, %.0f %% of its surface",
+                  100 * m->invented_share);
+    return measure_reference(m);
+}
+
 /* ---- keep it, or take it back ---- */
 
 /* Judge the new reference and the one before it by what held-out points of the sampled frames say. */
@@ -321,6 +346,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     if (!status) status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);
     if (!status) status = measure_reference(&m);
     if (!status && !trims) status = take_back_if_worse(&m);
+    if (!status) status = close_over(&m);
     if (!status) status = judge_invented(&m);
     if (!status) status = colour_reference(&m);
     npg_mesh_note(worker, "seconds", npg_clock_s() - since);

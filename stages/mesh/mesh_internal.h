@@ -61,8 +61,13 @@ void npg_point_set_close(npg_point_set *set);
  *     faces are decimated and mended; those of noisy points follow the points' normals */
 
 /* Surface that no point saw: drawn tight, or trimmed where it is a whole side; kept as Poisson closed it;
- * trimmed.  The words of --unseen, in their order. */
-typedef enum npg_unseen_way { NPG_UNSEEN_AUTO, NPG_UNSEEN_KEEP, NPG_UNSEEN_TRIM } npg_unseen_way;
+ * trimmed; as the first, and a shell that is left is closed in the end.  The words of --unseen, in their order. */
+typedef enum npg_unseen_way {
+    NPG_UNSEEN_AUTO,
+    NPG_UNSEEN_KEEP,
+    NPG_UNSEEN_TRIM,
+    NPG_UNSEEN_CLOSE
+} npg_unseen_way;
 
 #define NPG_FACES_PER_POINT 4 /* at most: more would be the mesher's, not the points' */
 
@@ -72,6 +77,9 @@ typedef struct npg_reconstruct_settings {
     int64_t face_max;             /* and no more faces than NPG_FACES_PER_POINT for each point given        */
     npg_poisson_settings poisson; /* with whom to ask for a stop                                            */
 } npg_reconstruct_settings;
+
+/* Faces that a reference has at most. */
+size_t npg_face_budget(const npg_reconstruct_settings *settings, const npg_point_set *set);
 
 /* *mesh (unit coordinates, without normals, faces counter-clockwise from outside; owned by the caller, NULL
  * on failure) from the set, whose points and normals may be smoothed and turned in place.  *invented_share
@@ -159,6 +167,13 @@ typedef struct npg_faired {
  * normals are left as they are.  empty (or NULL): space that sensors saw to be empty.  NPG_MEMORY. */
 npg_status npg_mesh_fair(npg_mesh *mesh, npg_faired *done, const float *points, size_t point_count,
                          double seen_dist, const npg_cube_set *empty);
+
+/* Close every piece of a mesh that has a border, whose faces are manifold and turned one way: it gets a second
+ * side, a copy of its own faces that look the other way, joined to it along the border, which is drawn tight
+ * as above between it while the first side stays.  So a hole becomes an opening from one side to the other.
+ * The first vertices and faces stay those they were; normals are dropped.  *added: vertices of second sides.
+ * NPG_MEMORY: *mesh may then be closed or not. */
+npg_status npg_mesh_close(npg_mesh **mesh, size_t *added);
 
 /* Share of the area, by the middles of faces, that lies in the cubes and not at their border. */
 double npg_mesh_share_in(const npg_mesh *mesh, const npg_cube_set *cubes);

@@ -110,7 +110,7 @@ static npg_status judge_unseen(reconstruction *r)
     double share, side = facts->brief.growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
     NPG_TRY(npg_mesh_unseen(&share, r->mesh, p->points, p->count, p->seen_dist));
     r->trims_unseen =
-        way == NPG_UNSEEN_TRIM || facts->brief.is_growing || (way == NPG_UNSEEN_AUTO && share > side);
+        way == NPG_UNSEEN_TRIM || facts->brief.is_growing || (way != NPG_UNSEEN_KEEP && share > side);
     npg_mesh_note(r->worker, "unseen_share", share);
     json_object_set_new(npg_worker_report(r->worker), "unseen",
                         json_string(r->trims_unseen ? "trimmed" : "kept"));
@@ -160,7 +160,7 @@ static npg_status fair(reconstruction *r)
     const npg_point_set *p = r->set;
     npg_faired done;
     npg_mending mending;
-    if (r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
+    if (r->settings->unseen != NPG_UNSEEN_AUTO && r->settings->unseen != NPG_UNSEEN_CLOSE) return NPG_OK;
     NPG_TRY(npg_mesh_fair(r->mesh, &done, p->points, p->count, FLAT_SHARE * p->seen_dist, p->empty));
     npg_mesh_note_count(r->worker, "vertices_flattened", done.moved);
     if (p->empty) npg_mesh_note_count(r->worker, "vertices_pushed", done.pushed);
@@ -179,11 +179,16 @@ static npg_status leave_empty_space(reconstruction *r)
 
 /* ---- few faces, and sound ones ---- */
 
+size_t npg_face_budget(const npg_reconstruct_settings *settings, const npg_point_set *set)
+{
+    size_t budget = NPG_FACES_PER_POINT * set->given, most = (size_t)settings->face_max;
+    return budget < most ? budget : most;
+}
+
 static npg_status decimate(reconstruction *r)
 {
     npg_mending mending;
-    size_t budget = NPG_FACES_PER_POINT * r->set->given;
-    if (budget > (size_t)r->settings->face_max) budget = (size_t)r->settings->face_max;
+    size_t budget = npg_face_budget(r->settings, r->set);
     NPG_TRY(npg_mesh_mend(&r->mesh, &mending)); /* closes small holes before the faces are counted */
     size_t holes = mending.holes;
     for (int round = 0; round < 4 && (!round || r->mesh->face_count > budget); round++) {

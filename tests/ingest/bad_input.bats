@@ -153,7 +153,7 @@ for _ in range(900):
     refused 3 "none.obj" in --reference none.obj
 }
 
-@test "half of a body that no point saw: trimmed and said, or kept and below the bar" {
+@test "half of a body that no point saw: trimmed and said, kept and below the bar, or closed as asked for" {
     mkdir half
     for n in 0 1 2; do
         awk '$1 == "v" && $4 > 0.02 { print $2, $3, $4 }' "$points/frame_000$n.obj" >half/frame_000$n.xyz
@@ -167,4 +167,9 @@ for _ in range(900):
     [ "$status" -eq 7 ]
     [[ "$output" == *"surface is invented"* ]]
     grep -q '"exit_code": 7' kept/done.json
+    run "$NEUPIG" run half -o closed --unseen close --bars residual=100,coverage=0 "${small[@]}" --sensor 0,0,10
+    echo "$output"
+    [ "$status" -eq 0 ]
+    grep -q 'a back that nobody saw closes it' closed/report.json
+    grep -q '"border_edges": 0' closed/report.json
 }

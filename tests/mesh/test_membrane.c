@@ -1,4 +1,4 @@
-/* Flatten: what no point saw is drawn tight; what points saw stays where it is. */
+/* Membrane: what no point saw is drawn tight; what points saw stays where it is.  A shell gets a back. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "mesh/mesh_internal.h"
+#include "tests/support/ball_mesh.h"
 
 #define SIDE 31 /* vertices along a side of the sheet */
 #define STEP (2.0 / (SIDE - 1))
@@ -151,6 +152,78 @@ static void what_lies_in_empty_space_is_pushed_out_of_it(void **state)
     assert_int_equal(npg_memory_used(), 0);
 }
 
+/* The upper half of a ball, and a whole one above it. */
+static npg_mesh *shell_and_ball(size_t *shell_verts)
+{
+    npg_mesh *mesh = ball_mesh(15, 24), *ball = ball_mesh(5, 8), *both;
+    uint8_t keep[2 * 24 * 15];
+    for (size_t f = 0; f < mesh->face_count; f++) {
+        keep[f] = 1;
+        for (size_t k = 0; k < 3; k++)
+            keep[f] &= mesh->vert_pos[3 * (size_t)mesh->faces[3 * f + k] + 2] > -1e-6f;
+    }
+    assert_int_equal(npg_mesh_keep_faces(&mesh, keep), NPG_OK);
+    size_t v = *shell_verts = mesh->vert_count, f = mesh->face_count;
+    assert_int_equal(npg_mesh_open(&both, v + ball->vert_count, f + ball->face_count), NPG_OK);
+    memcpy(both->vert_pos, mesh->vert_pos, 3 * v * sizeof(float));
+    memcpy(both->faces, mesh->faces, 3 * f * sizeof(uint32_t));
+    for (size_t i = 0; i < 3 * ball->vert_count; i++)
+        both->vert_pos[3 * v + i] = ball->vert_pos[i] + (i % 3 == 2 ? 2 : 0);
+    for (size_t i = 0; i < 3 * ball->face_count; i++) both->faces[3 * f + i] = (uint32_t)v + ball->faces[i];
+    npg_mesh_unref(&mesh);
+    npg_mesh_unref(&ball);
+    return both;
+}
+
+static void a_shell_gets_a_back_and_a_ball_stays(void **state)
+{
+    size_t shell, added;
+    npg_mesh *mesh = shell_and_ball(&shell), *before;
+    npg_manifold manifold;
+    int64_t handles;
+    (void)state;
+    assert_int_equal(npg_mesh_copy(&before, mesh), NPG_OK);
+    assert_int_equal(npg_mesh_close(&mesh, &added), NPG_OK);
+    assert_int_equal(added, shell);
+    assert_int_equal(mesh->vert_count, before->vert_count + shell);
+    assert_memory_equal(mesh->vert_pos, before->vert_pos, 3 * sizeof(float) * before->vert_count);
+    assert_memory_equal(mesh->faces, before->faces, 3 * sizeof(uint32_t) * before->face_count);
+    for (size_t v = before->vert_count; v < mesh->vert_count; v++)
+        assert_true(fabsf(mesh->vert_pos[3 * v + 2]) < 2e-3f); /* flat, in the plane of the border */
+    assert_int_equal(npg_mesh_manifold(&manifold, mesh), NPG_OK);
+    assert_int_equal(manifold.border_edges + manifold.crowded_edges + manifold.misoriented_edges, 0);
+    assert_int_equal(npg_mesh_handles(&handles, mesh), NPG_OK);
+    assert_int_equal(handles, 0);
+    /* the back looks outward: through the plane of the border, where the origin is, it adds nothing */
+    assert_true(fabs(npg_mesh_volume(mesh) / npg_mesh_volume(before) - 1) < 1e-2);
+    assert_int_equal(npg_mesh_close(&mesh, &added), NPG_OK);
+    assert_int_equal(added, 0); /* nothing is open any more */
+    npg_mesh_unref(&before);
+    npg_mesh_unref(&mesh);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
+static npg_status close_with_failure(uint64_t n)
+{
+    size_t shell, added;
+    npg_mesh *mesh = shell_and_ball(&shell);
+    npg_memory_fail_at(n, false);
+    npg_status status = npg_mesh_close(&mesh, &added);
+    npg_memory_fail_at(0, false);
+    npg_mesh_unref(&mesh);
+    return status;
+}
+
+static void a_back_without_memory_is_reported(void **state)
+{
+    uint64_t n = 1;
+    (void)state;
+    for (; close_with_failure(n) == NPG_MEMORY; n++) assert_int_equal(npg_memory_used(), 0);
+    assert_true(n > 5);
+    assert_int_equal(close_with_failure(n), NPG_OK);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
 static npg_status flatten_with_failure(const npg_mesh *bulge, const seen *s, const npg_cube_set *empty,
                                        uint64_t n)
 {
@@ -188,6 +261,8 @@ int main(void)
         cmocka_unit_test(nothing_moves_where_all_is_seen_or_nothing),
         cmocka_unit_test(a_piece_that_no_point_saw_keeps_its_shape),
         cmocka_unit_test(what_lies_in_empty_space_is_pushed_out_of_it),
+        cmocka_unit_test(a_shell_gets_a_back_and_a_ball_stays),
+        cmocka_unit_test(a_back_without_memory_is_reported),
         cmocka_unit_test(memory_that_fails_is_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -48,6 +48,23 @@ size_of() { od -An -tu1 -j16 -N8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $
     [[ "$output" == *"rig.json#9: the rig has no such frame"* ]]
 }
 
+@test "a rig in the camera's own axes is drawn upright" {
+    "$NEUPIG" synth -o r --rig --cameras 1 --frames 1 --width 80 --height 60 >/dev/null
+    python3 -c '
+import json, sys
+rig = json.load(open(sys.argv[1]))
+for sensor in rig["sensors"]: del sensor["pose"]
+json.dump(rig, open(sys.argv[2], "w"))' r/rig/rig.json r/rig/own.json
+    "$NEUPIG" render r/rig/own.json -o auto.png --height 50
+    "$NEUPIG" render r/rig/own.json -o down.png --height 50 --up -y
+    cmp auto.png down.png
+    "$NEUPIG" render r/rig/own.json -o y.png --height 50 --up y
+    run cmp -s auto.png y.png
+    [ "$status" -eq 1 ]
+    "$NEUPIG" probe r/rig/own.json | grep '^up  *-y, as the sensors stand; run --axes x-y-z'
+    "$NEUPIG" probe r/rig/rig.json | grep '^up  *y, as the sensors stand$'
+}
+
 @test "colours in the file are shown" {
     printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n' >c.ply
     printf 'property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n' >>c.ply

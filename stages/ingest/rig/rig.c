@@ -2,6 +2,7 @@
 #include "ingest/rig/rig_internal.h"
 
 #include <glob.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -171,6 +172,18 @@ void npg_rig_pose(const npg_rig *rig, double out[12], size_t s, const npg_rig_sh
             pose[4 * r + 2] = -pose[4 * r + 2];
         }
     npg_pose_combine(out, sensor->correction, pose);
+}
+
+npg_up npg_rig_up(const npg_rig *rig)
+{
+    double y = 0, z = 0, pose[12];
+    for (size_t s = 0; s < rig->sensor_count; s++) {
+        npg_rig_pose(rig, pose, s, rig->sensors[s].shots);
+        y -= pose[5]; /* images have y down */
+        z -= pose[9];
+    }
+    if (fabs(y) >= fabs(z)) return y < 0 ? NPG_UP_MINUS_Y : NPG_UP_Y;
+    return z < 0 ? NPG_UP_MINUS_Z : NPG_UP_Z;
 }
 
 void npg_rig_correct(npg_rig *rig, const npg_rig_view *views)

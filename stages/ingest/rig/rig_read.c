@@ -122,6 +122,18 @@ bool npg_rig_is_frame(const char *text)
     return split(path, &number, text);
 }
 
+npg_status npg_rig_up_of(npg_up *up, const char *text)
+{
+    char path[NPG_PATH_SIZE];
+    int64_t number;
+    npg_rig *rig;
+    if (!split(path, &number, text)) return npg_error(NPG_BAD_INPUT, "%s: no frame of a rig", text);
+    NPG_TRY(npg_rig_open(&rig, path, &npg_rig_usual));
+    *up = npg_rig_up(rig);
+    npg_rig_close(&rig);
+    return NPG_OK;
+}
+
 npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin)
 {
     char path[NPG_PATH_SIZE];
