@@ -124,6 +124,8 @@ static npg_status ask(npg_mesh **out, const float *rows, size_t point_count,
 {
     npg_poisson_request request = {.point_count = point_count,
                                    .memory_limit = settings->memory_limit,
+                                   .cpu_limit_s =
+                                       (uint64_t)(NPG_POISSON_THREADS * settings->time_limit_s) + 1,
                                    .depth = (uint32_t)settings->depth,
                                    .point_weight = (float)settings->point_weight};
     memcpy(request.magic, NPG_POISSON_ASK, 8);

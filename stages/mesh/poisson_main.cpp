@@ -27,13 +27,14 @@
 
 #include "mesh/poisson_wire.h"
 #include "pipeline/child.h"
+#include "pipeline/confine.h"
 
 namespace
 {
 
 // Two threads on every machine, never more: the sum of two parts is the same in either order, that of three
 // is not, and the same points are to give the same bits.
-constexpr int thread_count = 2;
+constexpr int thread_count = NPG_POISSON_THREADS;
 
 bool read_all(int fd, void *data, size_t size)
 {
@@ -197,6 +198,7 @@ int reconstruct(int out)
         return 3;
     }
     limit_memory(request.memory_limit);
+    npg_confine_time(request.cpu_limit_s);
     auto cloud = read_cloud(request);
     if (!cloud) {
         std::fprintf(stderr, "the request ends before its %llu points\n",
@@ -242,6 +244,7 @@ int main(int, char **argv)
     // What libraries print must not get between the bytes of the answer.
     int out = dup(STDOUT_FILENO);
     dup2(STDERR_FILENO, STDOUT_FILENO);
+    npg_confine_calls(); // what PCL makes of hostile points stays in here; older kernels have limits alone
     int code = guarded(out);
     // Without the checks at exit: PCL's reconstruction keeps memory that nothing points to any more.
     std::fflush(nullptr);

@@ -9,14 +9,17 @@
 
 #include <stdint.h>
 
-#define NPG_POISSON_ASK    "NPGPOIS1"
+#define NPG_POISSON_ASK    "NPGPOIS2"
 #define NPG_POISSON_ANSWER "NPGMESH1"
 #define NPG_POISSON_END    "NPGDONE1"
+
+#define NPG_POISSON_THREADS 2
 
 typedef struct npg_poisson_request {
     char magic[8]; /* NPG_POISSON_ASK */
     uint64_t point_count;
     uint64_t memory_limit; /* bytes of address space; 0: none */
+    uint64_t cpu_limit_s;  /* of all its threads; 0: none     */
     uint32_t depth;
     float point_weight;
 } npg_poisson_request;
