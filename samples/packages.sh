@@ -7,7 +7,7 @@ libpcl-dev libeigen3-dev libboost-dev libembree-dev libopenvdb-dev libtbb-dev li
 libpng-dev libjpeg62-turbo-dev liblzf-dev zlib1g-dev libzstd-dev libxxhash-dev"
 
 packages_to_test="libcmocka-dev bats clang-format-14 clang-14 libclang-rt-14-dev python3-numpy python3-venv python3-vtk9 blender
-file libxml2-utils parallel slurmctld slurmd slurm-client munge chromium"
+file patchelf libxml2-utils parallel slurmctld slurmd slurm-client munge chromium"
 # Node from elsewhere brings an npm that Debian's would not go with.
 command -v npm >/dev/null || packages_to_test="$packages_to_test nodejs npm"
 

@@ -4,9 +4,12 @@
 # then the README's other commands.
 #
 #   tests/clean_machine.sh [--user] [--tests]
+#   tests/clean_machine.sh --packages FOLDER
 #
 #   --user    as an ordinary user with sudo; else as root
 #   --tests   then all of the tests, tests/run.sh, in the same root
+#   --packages  instead of all that: installs the .deb files and the wheel of FOLDER (tools/release.sh, or cpack and
+#             tools/python/make_wheel.py) in a root that has neither sources nor compilers, and uses each from there
 #
 # The clone in the root has what is committed.  Package sources, proxies and name servers are those of this machine.
 # Package files are kept in NEUPIG_DEBS (/var/cache/neupig/debs) for the next time; pages of manuals are left out.
@@ -225,7 +228,52 @@ check_results() # ROOT CLONE LOG
     check_picture "$1$2/$picture"
 }
 
-inside() # SCRATCH AS_USER WITH_TESTS
+# In the root, as root: COMMAND.
+in_root() # ROOT COMMAND
+{
+    local name settings=()
+    for name in http_proxy https_proxy no_proxy; do
+        [ -z "${!name:-}" ] || settings+=("$name=${!name}")
+    done
+    chroot "$1" env -i --default-signal HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 TERM=dumb \
+        DEBIAN_FRONTEND=noninteractive "${settings[@]}" bash -e -c "$2" </dev/null
+}
+
+# The wheel first: it may not lean on what the packages bring.
+use_packages() # ROOT LOG FOLDER
+{
+    local root=$1 log=$2 apt="apt-get install -y -qq --no-install-recommends"
+    mkdir "$root/packages"
+    cp "$3"/*.deb "$3"/*.whl samples/run_folder.c "$root/packages/"
+    chmod -R a+rX "$root/packages"
+    echo "== The wheel, in an environment of its own, without a network"
+    in_root "$root" "apt-get update -qq && $apt python3-venv python3-numpy" >"$log" 2>&1 || failed "$(tail "$log")"
+    in_root "$root" 'cd /packages && python3 -m venv --system-site-packages /env && /env/bin/pip install --no-index ./*.whl
+        ! dpkg -l | grep -E "libopenvdb|libpcl|libtbb"
+        /env/bin/neupig synth --cell 0.06 --frames 2 --points 600 -o /capture
+        /env/bin/python - <<END
+import pathlib, neupig
+assert "/env/" in str(neupig.library_path), neupig.library_path
+neupig.run("/capture/points", "/by-wheel", faces=300)
+meshes = list(pathlib.Path("/by-wheel/meshes").iterdir())
+assert len(meshes) == 2 and pathlib.Path("/by-wheel/done.json").exists(), meshes
+print("python", neupig.__version__, len(meshes), "meshes")
+END
+        /env/bin/neupig view /by-wheel' || failed "the wheel does not work"
+    echo "== The packages: the command"
+    in_root "$root" "$apt /packages/neupig_*.deb /packages/libneupig0_*.deb" >"$log" 2>&1 || failed "$(tail "$log")"
+    in_root "$root" 'cd / && neupig run capture/points -o by-command --faces 300 -q || [ $? -eq 7 ]; neupig verify by-command
+        neupig view by-command && ! command -v cc' || failed "the installed command does not work"
+    echo "== The packages: a program linked with pkg-config"
+    carry_debs "$root/var/cache/apt/archives" "$debs"
+    in_root "$root" "$apt /packages/libneupig-dev_*.deb gcc libc6-dev pkg-config" >"$log" 2>&1 || failed "$(tail "$log")"
+    in_root "$root" 'cd / && cc -std=c11 -Wall -Werror packages/run_folder.c -o run_folder $(pkg-config --cflags --libs neupig)
+        ldd run_folder | grep -q "/lib/.*-linux-gnu/libneupig.so.0 "
+        ./run_folder capture/points by-program faces=300 || [ $? -eq 7 ]
+         test -s by-program/done.json' || failed "a program does not link or run"
+}
+
+inside() # SCRATCH AS_USER WITH_TESTS PACKAGES
 {
     local root=$1/root log=$1/log account home name packages=() readme command
     debs=${NEUPIG_DEBS:-/var/cache/neupig/debs}
@@ -234,6 +282,10 @@ inside() # SCRATCH AS_USER WITH_TESTS
     [ "$2" = no ] || packages=(sudo)
     echo "== A clean machine: a new root of $(. /etc/os-release && echo "$PRETTY_NAME")"
     make_root "$root" "$log" "${packages[@]}"
+    if [ -n "$4" ]; then
+        use_packages "$root" "$log" "$4"
+        return
+    fi
     account=$(make_account "$root" "$2")
     read -r home name <<<"$account"
     put_in_clone "$root" "$home" "$name"
@@ -264,16 +316,21 @@ fi
 
 # ---- outside: rights, and the end ----
 
-arguments=("$@") as_user=no with_tests=no
-for argument in "$@"; do
-    case $argument in
+arguments=("$@") as_user=no with_tests=no packages=""
+while [ $# -gt 0 ]; do
+    case $1 in
     --user) as_user=yes ;;
     --tests) with_tests=yes ;;
+    --packages)
+        packages=$(realpath -e "${2:-}") || exit 2
+        shift
+        ;;
     *)
-        echo "usage: tests/clean_machine.sh [--user] [--tests]" >&2
+        echo "usage: tests/clean_machine.sh [--user] [--tests] [--packages FOLDER]" >&2
         exit 2
         ;;
     esac
+    shift
 done
 
 if [ "$(id -u)" -ne 0 ]; then
@@ -308,10 +365,12 @@ trap 'exit 129' HUP
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-"${namespace[@]}" "$self" --inside "$scratch" "$as_user" "$with_tests" 9>&- &
+"${namespace[@]}" "$self" --inside "$scratch" "$as_user" "$with_tests" "$packages" 9>&- &
 inside=$!
 code=0
 wait "$inside" || code=$?
 inside=""
-[ "$code" -ne 0 ] || echo "== The README's commands work on a clean machine ($((SECONDS / 60)) min $((SECONDS % 60)) s)."
+what="The README's commands work"
+[ -z "$packages" ] || what="The packages work"
+[ "$code" -ne 0 ] || echo "== $what on a clean machine ($((SECONDS / 60)) min $((SECONDS % 60)) s)."
 exit "$code"

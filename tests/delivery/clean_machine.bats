@@ -75,3 +75,17 @@ is_gone() { # within ten seconds
         grep -qE "^ *(\\$ )?$name( |\$)" "$BATS_TEST_DIRNAME/../../README.md"
     done
 }
+
+@test "the packages, installed in a clean root, work from there" {
+    [ "${NEUPIG_TEST_ROOT:-}" = yes ] || skip "takes the network and 5 minutes; NEUPIG_TEST_ROOT=yes asks for it"
+    needs_namespaces
+    build=$(dirname "$NEUPIG")
+    cpack --config "$build/CPackConfig.cmake" -G DEB -B "$PWD/packages"
+    "$BATS_TEST_DIRNAME/../../tools/python/make_wheel.py" "$build" -o packages
+    unset TMPDIR # a root takes more than tests' folders may hold
+    run "$script" --packages packages
+    echo "$output"
+    [ "$status" -ne 77 ] || skip "no root can be made here"
+    [ "$status" -eq 0 ]
+    [[ "$output" == *"The packages work on a clean machine"* ]]
+}

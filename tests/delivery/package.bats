@@ -1,4 +1,4 @@
-# The Debian package, as samples/guide/technical_directors.md has it: made by CPack, unpacked into a folder, run from there; its list of dependencies is complete.
+# The Debian packages, as samples/guide/technical_directors.md has it: made by CPack, unpacked into a folder, run from there; their lists of dependencies are complete.
 
 setup_file() {
     build=$(dirname "$NEUPIG")
@@ -7,7 +7,7 @@ setup_file() {
     cd "$BATS_FILE_TMPDIR"
     cpack --config "$build/CPackConfig.cmake" -G DEB -B "$PWD" >cpack.log 2>&1 || { cat cpack.log; return 1; }
     rm -rf _CPack_Packages
-    dpkg-deb -x neupig_*.deb root
+    for package in *.deb; do dpkg-deb -x "$package" root; done
     export packed=yes
 }
 
@@ -17,14 +17,35 @@ setup() {
     libdir=$(dirname "$(find root -name libneupig.so)")
 }
 
-@test "it holds command, libraries, header, manual and licence, all below /usr" {
-    for file in bin/neupig libexec/neupig/neupig-{devices,poisson} include/neupig.h share/man/man1/neupig.1 \
-        share/neupig/view/page.html share/doc/neupig/copyright; do
-        [ -s "root/usr/$file" ]
-    done
+@test "program, library and development files are packages of their own, all below /usr, by architecture" {
+    [ "$(ls *.deb | cut -d _ -f 1 | xargs)" = "libneupig-dev libneupig0 neupig" ]
+    [ "$libdir" = "root/usr/lib/$(gcc -print-multiarch)" ]
+    holds() { # PACKAGE FILES...
+        dpkg-deb -c "$1"_*.deb | awk '{ print $6 }' >list
+        for file in "${@:2}" "share/doc/$1/copyright"; do
+            grep -qx "./usr/$file" list || { echo "$1 has no $file"; return 1; }
+            [ -s "root/usr/$file" ]
+        done
+    }
+    holds neupig bin/neupig share/man/man1/neupig.1 share/neupig/view/page.html share/doc/neupig/README.md \
+        share/doc/neupig/samples/guide/{README,artists,results}.md share/doc/neupig/samples/run_folder.c
+    holds libneupig0 "${libdir#root/usr/}/libneupig.so.0" libexec/neupig/neupig-{devices,poisson}
+    ! grep -E '\.so$|\.a$|\.h$' list
+    holds libneupig-dev include/neupig.h "${libdir#root/usr/}"/{libneupig.so,libneupig.a,pkgconfig/neupig.pc,cmake/neupig/neupigConfig.cmake}
+    # who wants to run it does not download the static library
+    [ "$(cat neupig_*.deb libneupig0_*.deb | wc -c)" -lt 6000000 ]
     [ "$(ls root)" = usr ]
     [ "$(PKG_CONFIG_PATH="$libdir/pkgconfig" pkg-config --variable=includedir neupig | xargs realpath)" = "$PWD/root/usr/include" ]
     ! find root -perm /022 ! -type l | grep .
+}
+
+@test "links of the pages it brings lead to pages it brings" {
+    cd root/usr/share/doc/neupig
+    for page in README.md samples/guide/*.md; do
+        grep -oE '\]\([^)#:]+[)#]' "$page" | sed 's/^](//; s/[)#]$//' | while read -r link; do
+            [ -e "$(dirname "$page")/$link" ] || { echo "$page: $link"; return 1; }
+        done
+    done
 }
 
 @test "unpacked anywhere it runs a capture to its end" {
@@ -44,16 +65,22 @@ setup() {
 }
 
 @test "every library that its programs name belongs to a package it depends on" {
-    dpkg-deb -f neupig_*.deb Depends | tr ',|' '\n\n' | awk '{ print $1 }' | sort -u >depends
+    check() { # PACKAGE FILES...
+        dpkg-deb -f "$1"_*.deb Depends | tr ',|' '\n\n' | awk '{ print $1 }' | sort -u >depends
+        for file in "${@:2}"; do
+            objdump -p "$file" | awk '$1 == "NEEDED" { print $2 }' >needed
+            [ -s needed ]
+            while read -r name; do
+                path=$(ldd "$file" | awk -v n="$name" '$1 == n { print $3 }')
+                [ -n "$path" ] || path=$(ldd "$file" | awk -v n="$name" 'index($1, n) { print $1 }')
+                owner=$(dpkg-query -S "$(realpath "$path")" "$path" 2>/dev/null | head -n 1 | cut -d : -f 1)
+                grep -qx "$owner" depends || { echo "$file needs $name ($path), which is of \"$owner\""; return 1; }
+            done <needed
+        done
+    }
+    check neupig root/usr/bin/neupig
+    grep -qx libneupig0 depends
+    check libneupig0 root/usr/libexec/neupig/neupig-{devices,poisson} "$libdir/libneupig.so.0"
     grep -qx pocl-opencl-icd depends
-    for file in root/usr/bin/neupig root/usr/libexec/neupig/neupig-{devices,poisson} "$libdir/libneupig.so"; do
-        objdump -p "$file" | awk '$1 == "NEEDED" { print $2 }' >needed
-        [ -s needed ]
-        while read -r name; do
-            path=$(ldd "$file" | awk -v n="$name" '$1 == n { print $3 }')
-            [ -n "$path" ] || path=$(ldd "$file" | awk -v n="$name" 'index($1, n) { print $1 }')
-            owner=$(dpkg-query -S "$(realpath "$path")" "$path" 2>/dev/null | head -n 1 | cut -d : -f 1)
-            grep -qx "$owner" depends || { echo "$file needs $name ($path), which is of \"$owner\""; return 1; }
-        done <needed
-    done
+    [ "$(dpkg-deb -f libneupig-dev_*.deb Depends)" = "libneupig0 (= $("$NEUPIG" version | cut -d ' ' -f 2))" ]
 }

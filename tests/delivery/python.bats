@@ -39,6 +39,26 @@ EOF
     unzip -p neupig-0.1.0-py3-none-any.whl neupig.pth 2>/dev/null | grep -q source || "$python" -m zipfile -l neupig-0.1.0-py3-none-any.whl | grep -q neupig.pth
 }
 
+@test "a wheel that carries library and command needs nothing of the system, nor of the tree" {
+    command -v patchelf >/dev/null || skip "needs patchelf"
+    "$root/tools/python/make_wheel.py" "$build" -o wheels
+    unset NEUPIG_LIBRARY
+    "$python" -m venv --system-site-packages carried
+    carried/bin/pip install --no-index --disable-pip-version-check wheels/*.whl >pip.log 2>&1
+    inside=$(echo "$PWD"/carried/lib/python3*/site-packages/neupig/lib)
+    # every library that is not of the C and C++ runtime comes from the wheel
+    for file in "$inside"/libneupig.so.0 "$inside"/neupig{,-poisson,-devices}; do
+        ldd "$file" | awk '$2 == "=>" { print $3 }' | grep -v "^$inside/" >outside || true
+        ! grep -vE '/(libc|libm|libdl|libpthread|librt|libstdc\+\+|libgcc_s)\.so' outside
+    done
+    ls "$inside/licences" | grep -q openvdb
+    carried/bin/neupig version | grep -qx "$("$NEUPIG" version)"
+    carried/bin/neupig synth --cell 0.06 --frames 2 --points 600 -o of-wheel >/dev/null
+    carried/bin/python -c 'import neupig, sys; assert str(neupig.library_path).startswith(sys.argv[1]); neupig.run("of-wheel/points", "out-of-wheel", faces=300)' "$inside"
+    [ -s out-of-wheel/done.json ]
+    carried/bin/neupig view out-of-wheel
+}
+
 @test "its tests pass" {
     cat >sizes.c <<'EOF'
 #include <neupig.h>

@@ -12,7 +12,6 @@ HERE = pathlib.Path(__file__).resolve().parent
 PROJECT = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 NAME, VERSION = PROJECT["name"], PROJECT["version"]
 DIST_INFO = f"{NAME}-{VERSION}.dist-info"
-WHEEL = f"{NAME}-{VERSION}-py3-none-any.whl"
 
 
 def _metadata() -> str:
@@ -34,21 +33,23 @@ def _sources() -> list[pathlib.Path]:
     return sorted(p for p in (HERE / NAME).iterdir() if p.suffix == ".py" or p.name == "py.typed")
 
 
-def _write_wheel(folder: str, files: dict[str, bytes]) -> str:
-    """The same bytes for the same files: order and times are fixed."""
+def _write_wheel(folder: str, files: dict[str, bytes], tag: str = "py3-none-any", programs: frozenset[str] = frozenset()) -> str:
+    """The same bytes for the same files: order and times are fixed.  programs: those of the files that can be run."""
+    pure = "true" if tag.endswith("-any") else "false"
     files[f"{DIST_INFO}/METADATA"] = _metadata().encode()
-    files[f"{DIST_INFO}/WHEEL"] = f"Wheel-Version: 1.0\nGenerator: {NAME}\nRoot-Is-Purelib: true\nTag: py3-none-any\n".encode()
+    files[f"{DIST_INFO}/WHEEL"] = f"Wheel-Version: 1.0\nGenerator: {NAME}\nRoot-Is-Purelib: {pure}\nTag: {tag}\n".encode()
     record = ""
     for name, data in files.items():
         digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
         record += f"{name},sha256={digest},{len(data)}\n"
     files[f"{DIST_INFO}/RECORD"] = (record + f"{DIST_INFO}/RECORD,,\n").encode()
-    with zipfile.ZipFile(pathlib.Path(folder) / WHEEL, "w", zipfile.ZIP_DEFLATED) as wheel:
+    name_of_wheel = f"{NAME}-{VERSION}-{tag}.whl"
+    with zipfile.ZipFile(pathlib.Path(folder) / name_of_wheel, "w", zipfile.ZIP_DEFLATED) as wheel:
         for name, data in files.items():
             entry = zipfile.ZipInfo(name)
-            entry.external_attr = 0o644 << 16
+            entry.external_attr = (0o100755 if name in programs else 0o100644) << 16  # pip asks whether it is a file
             wheel.writestr(entry, data, zipfile.ZIP_DEFLATED)
-    return WHEEL
+    return name_of_wheel
 
 
 def _source_tree() -> dict[str, bytes]:

@@ -8,6 +8,7 @@ import os
 import pathlib
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -31,6 +32,11 @@ def command_path() -> str:
     if said[1:2] != [VERSION]:
         raise Error(Status.FAILED, f"{found} is not the command of neupig {VERSION}")
     return found
+
+
+def main() -> None:
+    """The command as a wheel brings it that carries it (make_wheel.py)."""
+    os.execv(pathlib.Path(__file__).resolve().parent / "lib" / "neupig", ["neupig", *sys.argv[1:]])
 
 
 def command(verb: str, *operands: Path, **options: object) -> str:

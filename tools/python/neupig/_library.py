@@ -151,10 +151,13 @@ def _tree() -> pathlib.Path | None:
 
 
 def _candidates() -> list[str]:
-    """Where the library may be: as told, the build of the source tree, then where libraries are."""
+    """Where the library may be: as told, in the wheel, the build of the source tree, then where libraries are."""
     told = os.environ.get("NEUPIG_LIBRARY")
     if told:
         return [told]
+    carried = pathlib.Path(__file__).resolve().parent / "lib" / "libneupig.so.0"
+    if carried.exists():
+        return [str(carried)]
     tree = _tree()
     built = [str(tree / "build" / "libneupig.so.0")] if tree else []
     return [*built, "libneupig.so.0", f"{sys.prefix}/lib/libneupig.so.0", "/usr/local/lib/libneupig.so.0"]
