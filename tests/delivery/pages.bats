@@ -160,3 +160,8 @@ copy_tree() { # FOLDER
     [ "$status" -eq 0 ]
     [ "$(grep -c '"exit_code"' mine.json)" -eq 1 ]
 }
+
+@test "the page of all options is that of the program" {
+    "$root/tools/options_page.py" "$NEUPIG" --check
+    [ "$(grep -c '^| `--' "$root/samples/guide/options.md")" -gt 100 ]
+}
