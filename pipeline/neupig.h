@@ -273,6 +273,7 @@ typedef struct npg_result {
     /* V x 4 RGBA, sRGB: of the reference, or with colour = frames as this frame saw them; alpha 255: seen,
      * 254: lent by neighbours (of the reference) or by the reference (of a frame); NULL without colours */
     const uint8_t *vertex_colours;
+    int good; /* above the quality bar (option bars), by itself: what shows only beside later frames is in the report */
 } npg_result;
 
 /* Check the options, build the chain and start the run's threads.  hooks may be NULL.

@@ -107,10 +107,17 @@ static npg_status open_result(npg_result **out, const npg_run *run, const npg_fr
     if (status) npg_object_close(&result);
     NPG_TRY(status);
     npg_box_unit_to_world(&run->facts.box, vertices, frame->vert_unit, frame->vert_count);
-    result->given =
-        (npg_result){sizeof result->given,    frame->index, frame->number, frame->vert_count,
-                     reference->face_count,   vertices,     faces,         frame->figures.point_dist_median,
-                     frame->figures.coverage, colours};
+    result->given = (npg_result){sizeof result->given,
+                                 frame->index,
+                                 frame->number,
+                                 frame->vert_count,
+                                 reference->face_count,
+                                 vertices,
+                                 faces,
+                                 frame->figures.point_dist_median,
+                                 frame->figures.coverage,
+                                 colours,
+                                 frame->figures.good};
     *out = &result->given;
     return NPG_OK;
 }

@@ -66,8 +66,9 @@ static npg_status take_meshes(npg_run *run)
         double x = 0;
         for (size_t v = 0; v < mesh->vertex_count; v++)
             x += mesh->vertices[3 * v] / (double)mesh->vertex_count;
-        printf("frame %lld: %zu vertices, %zu faces, middle at x = %.3f, coverage %.2f\n",
-               (long long)mesh->number, mesh->vertex_count, mesh->face_count, x, mesh->coverage);
+        printf("frame %lld: %zu vertices, %zu faces, middle at x = %.3f, coverage %.2f%s\n",
+               (long long)mesh->number, mesh->vertex_count, mesh->face_count, x, mesh->coverage,
+               mesh->good ? "" : ", below the bar");
         npg_result_close(&mesh);
     }
     return status == NPG_END ? NPG_OK : status;

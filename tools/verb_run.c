@@ -111,6 +111,26 @@ static void end_watching(watcher *w)
 
 /* ---- the verb ---- */
 
+/* How good it is, and how to look at it: of a folder, or of each of its segments. */
+static void print_verdicts(const char *output, int depth)
+{
+    json_t *done = npg_json_in(output, "done.json"), *entry;
+    const char *verdict = json_string_value(json_object_get(done, "verdict"));
+    size_t i;
+    if (verdict) printf("%s: neupig view %s\n", verdict, output);
+    json_array_foreach(json_object_get(done, "files"), i, entry)
+    {
+        char folder[NPG_PATH_SIZE];
+        const char *name = json_string_value(json_object_get(entry, "path"));
+        char *end =
+            name && !depth && !npg_path_of(folder, output, name) ? strstr(folder, "/done.json") : NULL;
+        if (!end) continue;
+        *end = 0;
+        print_verdicts(folder, 1);
+    }
+    json_decref(done);
+}
+
 void npg_run_job_results(const char *verb, const char *output, npg_status status)
 {
     static const char *const names[] = {"meshes",      "reference.ply", "frames.jsonl",
@@ -129,10 +149,7 @@ void npg_run_job_results(const char *verb, const char *output, npg_status status
         snprintf(path, sizeof path, "%s/%s", output, names[i]);
         if (npg_is_there(path)) printf("%-14s %s\n", names[i], path);
     }
-    json_t *done = npg_json_in(output, "done.json"); /* how good it is, and how to look at it */
-    const char *verdict = json_string_value(json_object_get(done, "verdict"));
-    if (verdict) printf("%s: neupig view %s\n", verdict, output);
-    json_decref(done);
+    print_verdicts(output, 0);
 }
 
 npg_status npg_run_once(const npg_options *options, npg_reporter *reporter)

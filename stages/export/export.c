@@ -404,20 +404,27 @@ static npg_status conclude(npg_worker *worker)
     if (!output[0]) return NPG_OK;
     NPG_TRY(read_options(worker));
     set_centre(state, &npg_worker_facts(worker)->box);
-    NPG_TRY(npg_json_write(output, "report.json", whole));
+    char look[NPG_PATH_SIZE + 16];
+    snprintf(look, sizeof look, "neupig view %s", output);
     json_t *head =
-        json_pack("{ss sO sO sI sO* sO*}", "neupig", npg_version(), "status",
-                  json_object_get(whole, "status"), "exit_code", json_object_get(whole, "exit_code"),
-                  "frames", (json_int_t)npg_worker_facts(worker)->frame_count, "verdict",
-                  npg_json_at(whole, "stages.evaluate.verdict"), "meshes",
-                  json_object_get(npg_worker_report(worker), "meshes"));
+        json_pack("{sO* sO* so}", "verdict", npg_json_at(whole, "stages.evaluate.verdict"), "quality",
+                  npg_json_at(whole, "stages.evaluate.quality"), "look", npg_json_text(look));
+    json_t *report = json_copy(head); /* the same at the top of both */
+    json_object_update(report, whole);
+    npg_status status = npg_json_write(output, "report.json", report);
+    json_decref(report);
+    json_object_update_new(head, json_pack("{ss sO sO sI sO*}", "neupig", npg_version(), "status",
+                                           json_object_get(whole, "status"), "exit_code",
+                                           json_object_get(whole, "exit_code"), "frames",
+                                           (json_int_t)npg_worker_facts(worker)->frame_count, "meshes",
+                                           json_object_get(npg_worker_report(worker), "meshes")));
     report_settings(head, state);
     const npg_export_facts *facts = export_facts(worker);
     json_object_set_new(head, "box",
                         json_pack("{sf sf sf}", "diagonal", facts->diagonal, "longest", facts->longest,
                                   "largest", facts->largest));
     json_object_set_new(head, "options", npg_options_json(npg_worker_options(worker), NULL));
-    npg_status status = npg_done_end(output, head, state->choice.chosen[0]);
+    if (!status) status = npg_done_end(output, head, state->choice.chosen[0]);
     json_decref(head);
     return status ? status : npg_job_end(npg_job_of(worker));
 }

@@ -129,6 +129,7 @@ class Arrays(unittest.TestCase):
             radius = np.linalg.norm(motion.vertices[t] - centre(t), axis=1)
             self.assertLess(np.abs(radius - 1).max(), 0.15)
         self.assertGreater(motion.coverages.min(), 0.9)
+        self.assertTrue(motion.good.all())
 
     def test_push_and_pull(self):
         with neupig.Run(pull=True, **SMALL) as run:

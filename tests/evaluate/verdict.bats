@@ -16,6 +16,19 @@ setup_file() {
     done
 }
 
+@test "how good a result is stands in its last line, at the top of report.json, and in done.json" {
+    for name in one clean; do
+        text=$(sed -n '2s/.*"verdict": "\(.*\)",/\1/p' $name-out/report.json)
+        echo "$text"
+        [ "$(tail -1 $name.log)" = "$text: neupig view $name-out" ]
+        diff <(sed -n '2,/"look"/p' $name-out/report.json | tr -d ' ') <(sed -n '2,/"look"/p' $name-out/done.json | tr -d ' ')
+        grep -q "\"look\": \"neupig view $name-out\"" $name-out/done.json
+    done
+    [[ "$(tail -1 one.log)" == "0 of 14 frames good, median "*" %, worst frame "*"share of the surface that no points support"* ]]
+    [[ "$(tail -1 clean.log)" == "14 of 14 frames good, median "*" %, worst frame "*"95 % of its points within"* ]]
+    sed -n '/"quality": {/,/}/p' one-out/done.json | tr -d ' \n' | grep -q '"good":0,"frames":14,"median_percent":[0-9.]*,"worst_frame":[0-9]*,"worst":"share'
+}
+
 setup() {
     cd "$BATS_FILE_TMPDIR"
 }

@@ -79,6 +79,7 @@ static void check_result(const npg_result *result)
     assert_true(worst < 0.15); /* metres: few epochs, but the ball is where it was pushed */
     assert_true(result->residual >= 0 && result->residual < 0.02);
     assert_true(result->coverage > 0.9);
+    assert_true(result->good);
 }
 
 /* Positions of all frames in the order of time, and the faces. */

@@ -122,6 +122,12 @@ END
     [ "$(ls carried | grep -c ply)" -eq "$(ls "whole/$second/meshes" | wc -l)" ]
     run "$NEUPIG" eval carried "whole/$second/meshes" --samples 1000
     [[ "$output" == *"Corr 0.00000"* ]]
+    "$NEUPIG" verify whole
+    run "$NEUPIG" export whole --export npz
+    [ "$status" -eq 2 ]
+    [[ "$output" == *"whole/$second"* ]]
+    "$NEUPIG" export "whole/$second" --export npz
+    "$NEUPIG" verify whole
 }
 
 @test "a keyframe with the object raises it backward" {

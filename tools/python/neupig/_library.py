@@ -102,7 +102,8 @@ class CloudStruct(Structure):
 class ResultStruct(Structure):
     _fields_ = [("struct_size", c_size_t), ("index", c_int64), ("number", c_int64), ("vertex_count", c_size_t),
                 ("face_count", c_size_t), ("vertices", POINTER(c_double)), ("faces", POINTER(c_uint32)),
-                ("residual", c_double), ("coverage", c_double), ("vertex_colours", POINTER(c_ubyte))]
+                ("residual", c_double), ("coverage", c_double), ("vertex_colours", POINTER(c_ubyte)),
+                ("good", c_int)]
 
 
 class HitStruct(Structure):

@@ -73,4 +73,5 @@ def load(output: Path) -> Motion:
     figures = [line.get("figures", {}) for line in lines]
     return Motion(np.array([line["number"] for line in lines], np.int64), np.stack([m.vertices for m in meshes]),
                   meshes[0].faces, np.array([f.get("point_dist_median", np.nan) for f in figures], np.float64),
-                  np.array([f.get("coverage", np.nan) for f in figures], np.float64))
+                  np.array([f.get("coverage", np.nan) for f in figures], np.float64), None,
+                  np.array([line.get("good", False) for line in lines], np.bool_))

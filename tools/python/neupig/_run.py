@@ -58,6 +58,7 @@ class Frame:
     residual: float  #: median distance points -> surface, in diagonals of the box
     coverage: float  #: share of the surface that has points near it
     colours: npt.NDArray[np.uint8] | None = None  #: V x 4 RGBA, sRGB; None where the points have no colours
+    good: bool = True  #: above the quality bar, by itself
 
 
 class Motion(NamedTuple):
@@ -69,6 +70,7 @@ class Motion(NamedTuple):
     residuals: npt.NDArray[np.float64]  #: T
     coverages: npt.NDArray[np.float64]  #: T
     colours: npt.NDArray[np.uint8] | None = None  #: V x 4 of the reference; with colour="frames" T x V x 4
+    good: npt.NDArray[np.bool_] | None = None  #: T, above the quality bar
 
 
 class Outcome(NamedTuple):
@@ -297,7 +299,7 @@ class Run(Closing):
         try:
             return Frame(r.index, r.number, np.ctypeslib.as_array(r.vertices, (r.vertex_count, 3)).copy(),
                          np.ctypeslib.as_array(r.faces, (r.face_count, 3)).copy(), r.residual, r.coverage,
-                         None if (c := _colours(r.vertex_colours, r.vertex_count)) is None else c.copy())
+                         None if (c := _colours(r.vertex_colours, r.vertex_count)) is None else c.copy(), bool(r.good))
         finally:
             lib.npg_result_close(byref(result))
 
@@ -423,4 +425,5 @@ def reconstruct(frames: Iterable[Cloud], *, progress: Callable[[Progress], None]
     if colours is not None and any(not np.array_equal(each, colours) for each in all_colours):
         colours = np.stack(all_colours)
     return Motion(np.array([m.number for m in meshes], np.int64), np.stack([m.vertices for m in meshes]),
-                  meshes[0].faces, np.array([m.residual for m in meshes]), np.array([m.coverage for m in meshes]), colours)
+                  meshes[0].faces, np.array([m.residual for m in meshes]), np.array([m.coverage for m in meshes]), colours,
+                  np.array([m.good for m in meshes]))
