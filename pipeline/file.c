@@ -146,7 +146,7 @@ static npg_status fill_file(npg_file *file, const char *path)
     /* where the file is written until it is whole */
     snprintf(file->hidden_path, size, "%.*s.%s.part", (int)(name - path), path, name);
     if (slash) file->folder[slash == path ? 1 : slash - path] = 0;
-    file->fd = open(file->hidden_path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
+    file->fd = open(file->hidden_path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0666);
     return file->fd < 0 ? npg_error_errno(NPG_DISK, "can't write %s", path) : NPG_OK;
 }
 
@@ -209,6 +209,32 @@ npg_status npg_file_patch(npg_file *file, uint64_t offset, const void *data, siz
     if (!file->status && !npg_write_at(file->fd, data, size, (int64_t)offset))
         return keep_failure(file, "write");
     return file->status;
+}
+
+npg_status npg_file_reread(npg_file *file, void *data, size_t size, uint64_t offset)
+{
+    size_t got = size;
+    NPG_REQUIRE(offset <= npg_file_size(file) && size <= npg_file_size(file) - offset);
+    if (!file->status && offset + size > file->flushed) NPG_TRY(flush_buffer(file));
+    if (!file->status && (!npg_read_at(file->fd, data, &got, (int64_t)offset) || got < size))
+        return keep_failure(file, "read");
+    return file->status;
+}
+
+npg_status npg_file_append(npg_file *file, npg_file **part)
+{
+    npg_arena scratch = {.purpose = NPG_FOR_FILES};
+    unsigned char *bytes = npg_arena_take(&scratch, BUFFER_SIZE, 1);
+    npg_status status = npg_arena_status(&scratch);
+    for (uint64_t at = 0, size; at < npg_file_size(*part) && !status; at += size) {
+        size = npg_file_size(*part) - at < BUFFER_SIZE ? npg_file_size(*part) - at : BUFFER_SIZE;
+        status = npg_file_reread(*part, bytes, size, at);
+        if (status) npg_error_set(status, (*part)->cause);
+        if (!status) status = npg_file_write(file, bytes, size);
+    }
+    npg_arena_release(&scratch);
+    npg_file_discard(part);
+    return status;
 }
 
 npg_status npg_file_print(npg_file *file, const char *format, ...)

@@ -28,6 +28,12 @@ uint64_t npg_file_size(const npg_file *file);
  * with npg_file_write(). */
 npg_status npg_file_patch(npg_file *file, uint64_t offset, const void *data, size_t size);
 
+/* Bytes that were written, back: all of them are there.  Failures as with npg_file_write(). */
+npg_status npg_file_reread(npg_file *file, void *data, size_t size, uint64_t offset);
+
+/* All that was written to `part` behind what was written to file; part is closed without a result. */
+npg_status npg_file_append(npg_file *file, npg_file **part);
+
 /* Make the file appear under its name; closes it in any case. */
 npg_status npg_file_commit(npg_file **file);
 

@@ -26,7 +26,7 @@ const npg_option npg_apply_options[] = {
     NPG_ROW_REAL  ("far",       AT(far_share), "0.05",  0,     1e6,  "SHARE",
         "Points farther from the reference than this share of its diagonal are reported (exit code 7)"),
     NPG_ROW_TEXT  ("export",    AT(list),      "",      "LIST",
-        "What to write, with commas, as of neupig run: ply, obj, pc2, mdd, glb, usda, npz, vdb. "
+        "What to write, with commas, as of neupig run: ply, obj, pc2, mdd, glb, glb-meshopt, vat, usda, npz, vdb. "
         "Without: OBJ of an OBJ file, PLY of others"),
     NPG_ROW_TEXT  ("prefix",    AT(prefix),    "frame", "NAME",
         "First part of the files' names"),

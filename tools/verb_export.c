@@ -12,7 +12,7 @@ typedef struct settings {
 const npg_option npg_export_options[] = {
     /* type        name      place                    default  shown as */
     NPG_ROW_TEXT  ("export", offsetof(settings, list), "",     "LIST",
-        "What to write, with commas, as of neupig run: ply, obj, pc2, mdd, glb, usda, npz, vdb"),
+        "What to write, with commas, as of neupig run: ply, obj, pc2, mdd, glb, glb-meshopt, vat, usda, npz, vdb"),
     {0}};
 /* clang-format on */
 

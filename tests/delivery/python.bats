@@ -76,6 +76,8 @@ int main(int argc, char **argv)
     SIZE("OptionInfo", npg_option_info), SIZE("FrameView", npg_frame_view), SIZE("CustomStage", npg_custom_stage);
     SIZE("LogRecord", npg_log_record), SIZE("Progress", npg_progress), SIZE("Hooks", npg_hooks);
     SIZE("Cloud", npg_cloud), SIZE("Result", npg_result), SIZE("Hit", npg_surface_hit);
+    SIZE("CaptureFacts", npg_capture_facts), SIZE("EvalFigures", npg_eval_figures), SIZE("EvalSettings", npg_eval_settings);
+    SIZE("ApplySettings", npg_apply_settings), SIZE("Applied", npg_applied), SIZE("Exported", npg_exported);
     return 0;
 }
 EOF

@@ -66,6 +66,12 @@ class Files(unittest.TestCase):
         self.assertEqual(neupig.probe(self.capture.points)["points"]["total"], 6000)
         folder = neupig.apply(WORK / "out", WORK / "out" / "reference.ply", WORK / "carried")
         self.assertEqual(len(list(folder.glob("frame_*.ply"))), 4)
+        self.assertEqual(neupig.export(WORK / "out", ["npz", "pc2"]), 3)
+        self.assertEqual(neupig.export(WORK / "out", "npz"), 0)
+        arrays = np.load(WORK / "out" / "motion.npz")
+        np.testing.assert_allclose(arrays["vertices"], neupig.load(WORK / "out").vertices, atol=1e-6)
+        self.assertEqual(len(figures["per_frame"]), 4)
+        self.assertGreater(figures["Corr"], 0)
         picture = neupig.render(WORK / "out" / "meshes", WORK / "strip.png", height=64, samples=1)
         self.assertEqual(picture.read_bytes()[:4], b"\x89PNG")
 
@@ -246,6 +252,12 @@ class Failures(unittest.TestCase):
     def test_they_carry_status_and_words(self):
         self.check(neupig.Status.BAD_INPUT, "nowhere", lambda: neupig.run("/nowhere", WORK / "x"))
         self.check(neupig.Status.USAGE, "no option flavour", lambda: neupig.run("/nowhere", WORK / "x", flavour=1))
+        self.check(neupig.Status.USAGE, "no option keep_gong; did you mean keep_going?",
+                   lambda: neupig.run("/nowhere", WORK / "x", keep_gong=True))
+        self.check(neupig.Status.USAGE, "did you mean progress?", lambda: neupig.run("/nowhere", WORK / "x", progres=print))
+        self.check(neupig.Status.USAGE, "did you mean samples?", lambda: neupig.eval("/nowhere", "/nowhere", sample=3))
+        self.check(neupig.Status.USAGE, "did you mean fps_scale?", lambda: neupig.apply("/n", "/n", "/n", fps_scle=3))
+        self.check(neupig.Status.USAGE, "not the output folder", lambda: neupig.export("/nowhere", "glb"))
         self.check(neupig.Status.USAGE, "epochs", lambda: neupig.run("/nowhere", WORK / "x", epochs="many"))
         self.check(neupig.Status.BAD_INPUT, "nowhere", lambda: neupig.eval("/nowhere", "/nowhere"))
         self.check(neupig.Status.USAGE, "holds no job", lambda: neupig.append(WORK / "x"))

@@ -1,14 +1,16 @@
 """Independent readers of what `neupig run --export` writes: NumPy and plain parsing here, VTK and Blender where
 they are installed.
 
-    python3 check_exports.py {numpy|vtk|obj} RUN
+    python3 check_exports.py {numpy|vtk|vat|usda|obj} RUN
     blender -b --python-exit-code 3 -P check_exports.py -- blender RUN
 
 RUN is the output folder of a run with npz, pc2, mdd, glb, usda, vdb; exits with a word on the first difference."""
 import glob
 import json
+import re
 import struct
 import sys
+import zlib
 
 import numpy as np
 
@@ -118,6 +120,88 @@ def check_numpy(run):
     check_caches(run, frames, vertices, done["fps"])
 
 
+def normals_of(pose, faces):
+    """Of each vertex: the sum of its faces' normals weighted by area, as unit vectors."""
+    corners = pose[faces].astype(float)
+    of_faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = np.zeros(pose.shape)
+    for k in range(3):
+        np.add.at(sums, faces[:, k], of_faces)
+    return sums / np.linalg.norm(sums, axis=1, keepdims=True)
+
+
+def read_png16(path):
+    """An RGB picture of 16 bits, rows unfiltered (PNG, ISO/IEC 15948)."""
+    data, at, packed, size = open(path, "rb").read(), 8, b"", None
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        body = data[at + 8:at + 8 + length]
+        if zlib.crc32(kind + body) != struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0]:
+            fail(f"{path}: checksum of {kind}")
+        if kind == b"IHDR":
+            size = struct.unpack(">IIBBBBB", body)
+        packed += body if kind == b"IDAT" else b""
+        at += 12 + length
+    if size[2:] != (16, 2, 0, 0, 0):
+        fail(f"{path}: not RGB of 16 bits: {size}")
+    rows = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(size[1], 1 + 6 * size[0])
+    if (rows[:, 0] != 2).any():
+        fail(f"{path}: another filter than differences from the row above")
+    return np.cumsum(rows[:, 1:], 0, np.uint8).view(">u2").reshape(size[1], size[0], 3).astype(float)
+
+
+def check_vat(run):
+    """The mesh's second texture coordinates find each vertex's texel, and that has its place and normal in every frame."""
+    frames, vertices, faces = truth(run)
+    about = json.load(open(f"{run}/motion_vat.json"))
+    lo, hi = np.array(about["box"]["lo"]), np.array(about["box"]["hi"])
+    positions, normals = (read_png16(f"{run}/{about[kind]}") for kind in ("positions", "normals"))
+    glb = open(f"{run}/{about['mesh']}", "rb").read()
+    length = struct.unpack("<I", glb[12:16])[0]
+    root = json.loads(glb[20:20 + length])
+    part = root["meshes"][0]["primitives"][0]
+
+    def values(accessor, kind, width):
+        view = root["bufferViews"][root["accessors"][accessor]["bufferView"]]
+        return np.frombuffer(glb, kind, view["byteLength"] // 4, 28 + length + view["byteOffset"]).reshape(-1, width)
+
+    uv = values(part["attributes"]["TEXCOORD_1"], "<f4", 2)
+    base = values(part["attributes"]["POSITION"], "<f4", 3)
+    step = (hi - lo).max() / 65535
+    shown = held(frames, vertices)
+    if about["frames"] != len(shown):
+        fail(f"vat: {about['frames']} frames, expected {len(shown)}")
+    if values(part["indices"], "<u4", 3).tolist() != faces.tolist():
+        fail("vat: other faces")
+    same("vat mesh", base, shown[0])
+    for at, pose in enumerate(shown):
+        row = np.floor((uv[:, 1] + at * about["step_v"]) * about["height"]).astype(int)
+        column = np.floor(uv[:, 0] * about["width"]).astype(int)
+        same(f"vat frame {at}", lo + positions[row, column] / 65535 * (hi - lo), pose, 0.51 * step + 1e-7)
+        same(f"vat normals {at}", 2 * normals[row, column] / 65535 - 1, normals_of(pose, faces), 1e-4)
+
+
+def samples_of(text, name):
+    block = text[text.index(f" {name}.timeSamples = {{") + 1:]
+    block = block[block.index("\n") + 1:block.index("\n        }")]
+    return {int(line.split(":")[0]): np.array(re.findall(r"-?[0-9][-0-9.e+]*", line.split(":")[1]), float).reshape(-1, 3)
+            for line in block.split("\n")}
+
+
+def check_usda(run):
+    """Normals are the surface's, velocities the change from the frame before to the one behind over the time between."""
+    frames, vertices, faces = truth(run)
+    text, done = open(f"{run}/motion.usda").read(), json.load(open(f"{run}/done.json"))
+    normals, velocities = samples_of(text, "normals"), samples_of(text, "velocities")
+    size = np.ptp(vertices.reshape(-1, 3), 0).max()
+    for at, frame in enumerate(frames):
+        a, b = max(at - 1, 0), min(at + 1, len(frames) - 1)
+        seconds = (frames[b]["index"] - frames[a]["index"]) / done["fps"]
+        same(f"usda normals {at}", normals[frame["index"]], normals_of(vertices[at], faces), 2e-4)
+        same(f"usda velocities {at}", velocities[frame["index"]], (vertices[b].astype(float) - vertices[a]) / seconds,
+             1e-5 * size / seconds)
+
+
 def check_vtk(run):
     import vtk
     from vtk.util.numpy_support import vtk_to_numpy
@@ -206,4 +290,4 @@ def check_blender(run):
 
 if __name__ == "__main__":
     what, *rest = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else sys.argv[1:]
-    {"numpy": check_numpy, "vtk": check_vtk, "obj": check_obj, "blender": check_blender}[what](*rest)
+    {"numpy": check_numpy, "vtk": check_vtk, "vat": check_vat, "usda": check_usda, "obj": check_obj, "blender": check_blender}[what](*rest)

@@ -3,7 +3,7 @@
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6}' --faces 400
     --bars residual=100,flipped=100 --quiet)
-forms=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "vdb-voxel": 0.04}' --export obj,ply,pc2,mdd,glb,usda,npz,vdb --unit cm --up z --fps 24)
+forms=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "vdb-voxel": 0.04}' --export obj,ply,pc2,mdd,glb,glb-meshopt,vat,usda,npz,vdb --unit cm --up z --fps 24)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -42,12 +42,28 @@ find_modules() {
 
 @test "the Khronos validator finds neither errors nor warnings in the GLB" {
     find_modules
-    node "$BATS_TEST_DIRNAME/check_exports.mjs" "$modules" glb whole/motion.glb
+    node "$BATS_TEST_DIRNAME/check_exports.mjs" "$modules" glb whole/motion.glb whole/motion_meshopt.glb whole/motion_vat.glb
 }
 
 @test "a USD parser finds every sample" {
     find_modules
     node "$BATS_TEST_DIRNAME/check_exports.mjs" "$modules" usda whole
+}
+
+@test "normals and velocities of USD are those of the meshes" {
+    find_python
+    "$python" "$BATS_TEST_DIRNAME/check_exports.py" usda whole
+}
+
+@test "meshoptimizer's decoder finds every frame in the compact GLB" {
+    find_modules
+    node "$BATS_TEST_DIRNAME/check_exports.mjs" "$modules" meshopt whole
+    [ "$(stat -c %s whole/motion_meshopt.glb)" -lt "$(stat -c %s whole/motion.glb)" ]
+}
+
+@test "vertex animation textures move the mesh as the run does" {
+    find_python
+    "$python" "$BATS_TEST_DIRNAME/check_exports.py" vat whole
 }
 
 @test "VTK plays the GLB" {
@@ -110,7 +126,7 @@ END
     [ ! -e killed/done.json ]
     "$NEUPIG" run capture/points -o killed "${small[@]}" "${forms[@]}" || [ $? -eq 7 ]
     grep -q resumed_frames killed/report.json
-    for name in motion.pc2 motion.mdd motion.glb motion.usda motion.npz reference.obj obj volumes; do
+    for name in motion.pc2 motion.mdd motion.glb motion_meshopt.glb motion_vat.glb motion_vat_positions.png motion.usda motion.npz reference.obj obj volumes; do
         diff -r whole/$name killed/$name
     done
     [ -z "$(find killed -name '.*.part')" ]

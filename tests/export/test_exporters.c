@@ -187,6 +187,12 @@ static void what_a_form_can_not_hold_is_refused(void **state)
     assert_int_equal(npg_exporters_choose(&choice, "glb", NULL), NPG_OK);
     assert_int_equal(npg_exporters_check(&choice, &facts), NPG_USAGE);
     assert_non_null(strstr(npg_error_text(), "glb"));
+    facts.vert_count = 8193;
+    facts.last_index = 4999; /* two rows a frame */
+    assert_int_equal(npg_exporters_choose(&choice, "vat", NULL), NPG_OK);
+    assert_int_equal(npg_exporters_check(&choice, &facts), NPG_USAGE);
+    assert_non_null(strstr(npg_error_text(), "5000 frames of 8193 vertices"));
+    facts.last_index = 0;
     facts.pose_count = -1; /* a live source: nothing is known, nothing is refused */
     facts.vert_count = V;
     facts.face_count = F;
@@ -339,8 +345,7 @@ static void colours_of_frames_come_along(void **state)
     assert_non_null(samples);
     const char *first = strstr(samples, "            0: [(1.00000, 0.00000, 0.00000), (0.00000, 1.00000, "),
                *second = strstr(samples, "            1: [(0.50289, 0.50289, 0.50289), (0.50289, ");
-    const char *end =
-        strstr(samples, "        }\n        point3f[] points.timeSamples = {\n            0: [");
+    const char *end = strstr(samples, "        }\n    }\n}\n");
     assert_true(first && second && end && samples < first && first < second && second < end);
     int tuples = 0;
     for (const char *at = first; at < end; at++) tuples += *at == '(';
@@ -449,7 +454,7 @@ static void a_stop_leaves_nothing(void **state)
 /* A limit on the size of files stands for the full disk. */
 static void a_full_disk_is_said(void **state)
 {
-    const char *const lists[] = {"pc2", "mdd", "glb", "usda", "npz", "vdb", "ply,obj"};
+    const char *const lists[] = {"pc2", "mdd", "glb", "usda", "npz", "vdb", "vat", "glb-meshopt", "ply,obj"};
     const char *out = make_run("full", 300, -1);
     (void)state;
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
@@ -542,7 +547,7 @@ static size_t counted_for(const char *list, int64_t count)
 
 static void memory_does_not_grow_with_frames(void **state)
 {
-    const char *const lists[] = {"ply,obj", "pc2", "mdd", "usda", "npz", "vdb", "glb"};
+    const char *const lists[] = {"ply,obj", "pc2", "mdd", "usda", "npz", "vdb", "vat", "glb-meshopt", "glb"};
     const npg_allocator noting = {sizeof noting, NULL, take, give};
     (void)state;
     assert_int_equal(npg_memory_set_allocator(&noting), NPG_OK);
@@ -572,7 +577,7 @@ static void no_memory_leaves_no_list(void **state)
         npg_export_watch watch = {0};
         facts.uvs = uvs;
         npg_memory_fail_at(n, false);
-        status = write_list("ply,obj,pc2,mdd,glb,usda,npz,vdb", &facts, &watch);
+        status = write_list("ply,obj,pc2,mdd,glb,glb-meshopt,vat,usda,npz,vdb", &facts, &watch);
         npg_memory_fail_at(0, false);
         assert_true(status == NPG_OK || status == NPG_MEMORY);
         assert_int_equal(is_there(out, "exports.partial.jsonl"), status == NPG_OK);

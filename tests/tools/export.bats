@@ -3,7 +3,7 @@
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6, "vdb-voxel": 0.04}' --faces 400
     --bars residual=100,flipped=100,stretched=100,unsupported=100 --unit cm --up z --fps 24 --quiet)
-forms=obj,ply,pc2,mdd,glb,usda,npz,vdb
+forms=obj,ply,pc2,mdd,glb,glb-meshopt,vat,usda,npz,vdb
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -21,7 +21,7 @@ setup() {
 
 # Every format of a folder is the same as of the run that made all at once.
 same_as_at_once() {
-    for name in motion.pc2 motion.mdd motion.glb motion.usda motion.npz reference.obj obj volumes; do
+    for name in motion.pc2 motion.mdd motion.glb motion_meshopt.glb motion_vat.json motion_vat_normals.png motion.usda motion.npz reference.obj obj volumes; do
         diff -r "$1/$name" at_once/$name
     done
 }
@@ -32,9 +32,9 @@ same_as_at_once() {
     [ "$output" = "2 files more in out" ]
     "$NEUPIG" export out --export $forms
     same_as_at_once out
-    [ "$("$NEUPIG" verify out)" = "out: 30 files as they were written" ]
+    [ "$("$NEUPIG" verify out)" = "out: 35 files as they were written" ]
     grep -q '"path":"motion.glb","bytes":[0-9]*,"xxh3":"[0-9a-f]*","form":"glb","first":0,"frames":7' out/done.json
-    tr -d '\n ' <out/done.json | grep -q '"forms":\["ply","obj","pc2","mdd","glb","usda","npz","vdb"\]'
+    tr -d '\n ' <out/done.json | grep -q '"forms":\["ply","obj","pc2","mdd","glb","glb-meshopt","vat","usda","npz","vdb"\]'
     run "$NEUPIG" export out --export npz,glb
     [ "$output" = "out: all of it lies there already" ]
     printf X | dd of=out/motion.glb bs=1 seek=400 conv=notrunc 2>/dev/null

@@ -9,17 +9,21 @@
 #define KEPT_SHARE  1e-6     /* of the box: what positions may lose, a micrometre in a metre */
 
 extern const npg_exporter npg_exporter_ply, npg_exporter_obj, npg_exporter_pc2, npg_exporter_mdd,
-    npg_exporter_glb, npg_exporter_usda, npg_exporter_npz, npg_exporter_vdb;
+    npg_exporter_glb, npg_exporter_glb_meshopt, npg_exporter_vat, npg_exporter_usda, npg_exporter_npz,
+    npg_exporter_vdb;
 
-const npg_exporter *const npg_exporters[] = {&npg_exporter_ply,  /* beside OBJ                           */
-                                             &npg_exporter_obj,  /* beside PLY                           */
-                                             &npg_exporter_pc2,  /* 3ds Max, Blender, Marvelous Designer */
-                                             &npg_exporter_mdd,  /* LightWave, Blender, three.js         */
-                                             &npg_exporter_glb,  /* the web, Blender, Unreal             */
-                                             &npg_exporter_usda, /* USD tools, Unreal                    */
-                                             &npg_exporter_npz,  /* NumPy                                */
-                                             &npg_exporter_vdb,  /* Houdini, Blender                     */
-                                             NULL};
+const npg_exporter *const npg_exporters[] = {
+    &npg_exporter_ply,         /* beside OBJ                           */
+    &npg_exporter_obj,         /* beside PLY                           */
+    &npg_exporter_pc2,         /* 3ds Max, Blender, Marvelous Designer */
+    &npg_exporter_mdd,         /* LightWave, Blender, three.js         */
+    &npg_exporter_glb,         /* the web, Blender, Unreal             */
+    &npg_exporter_glb_meshopt, /* the web, compact                     */
+    &npg_exporter_vat,         /* Unreal, Unity, Godot                 */
+    &npg_exporter_usda,        /* USD tools, Unreal                    */
+    &npg_exporter_npz,         /* NumPy                                */
+    &npg_exporter_vdb,         /* Houdini, Blender                     */
+    NULL};
 
 /* ---- choosing ---- */
 

@@ -211,6 +211,28 @@ npg_status npg_export_locked(npg_exported *made, const char *output, const char 
 npg_status npg_write_pose(const char *path, const npg_export_facts *facts, const float *pos,
                           const float *normals, const uint8_t *colours);
 
+/* ---- glTF ---- */
+
+#define NPG_GLB_POSES_MOST 256 /* in one mesh: what WebGL2 holds for sure */
+
+/* Vertices doubled where their corners have more than one texture coordinate. */
+typedef struct npg_corner_split {
+    size_t count;      /* G >= V                              */
+    uint32_t *vertex;  /* G: the vertex each one is a copy of */
+    float *uvs;        /* G x 2 or NULL                       */
+    uint32_t *indices; /* F x 3 of them                       */
+} npg_corner_split;
+
+/* Of facts' uvs or corner_uvs, which may be NULL; without corner_uvs the vertices stay as they are.  Vertices that no
+ * face uses are kept.  Arrays are the arena's. */
+npg_status npg_split_corners(npg_corner_split *split, npg_arena *arena, const npg_export_facts *facts);
+
+/* A GLB whose JSON is known, up to where its binary part begins. */
+npg_status npg_glb_begin(npg_file *file, const json_t *root, uint64_t binary_size);
+
+/* The node "capture" with mesh 0: from the files' coordinates to metres with y up. */
+json_t *npg_glb_node(const npg_export_facts *facts);
+
 /* ---- faces that close the openings of a surface ---- */
 
 /* Fans over the pieces of a mesh's border, turned as the faces around them, so that mesh and caps together are

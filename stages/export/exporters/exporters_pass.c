@@ -25,8 +25,11 @@ static bool is_ours(const clearing *c, const char *name)
     for (int i = 0; npg_exporters[i]; i++)
         if (npg_exporters[i]->file && !strcmp(npg_exporters[i]->file, name)) return true;
     sscanf(name, "motion_%*[0-9].glb%n", &end);
-    return (end && !name[end]) || !strcmp(name, "motion.glb") || !strcmp(name, "reference.obj") ||
-           !strcmp(name, NPG_EXPORT_LIST_NAME);
+    if (!end) sscanf(name, "motion_meshopt_%*[0-9].glb%n", &end);
+    return (end && !name[end]) || !strncmp(name, "motion.usda.", 12) ||
+           !strncmp(name, "motion.meshopt.", 15) || !strncmp(name, "motion_vat", 10) ||
+           !strcmp(name, "motion_meshopt.glb") || !strcmp(name, "motion.glb") ||
+           !strcmp(name, "reference.obj") || !strcmp(name, NPG_EXPORT_LIST_NAME);
 }
 
 bool npg_exporters_own(const char *name)

@@ -2,7 +2,7 @@
  *
  * The first frame of a file is its mesh, each further one a morph target with the difference, and an
  * animation of the weights shows one after the other, blending in between.  A file holds at most
- * POSES_MOST frames (and 4 GiB): a longer capture becomes motion_000.glb, motion_001.glb ..., each
+ * NPG_GLB_POSES_MOST frames (and 4 GiB): a longer capture becomes motion_000.glb, motion_001.glb ..., each
  * beginning at time 0 with the frame after the last one of the file before; asset.extras says where it
  * belongs.  The node turns z up into y up and the unit into metres.  Colours are linear light there, v of
  * texture coordinates runs down. */
@@ -13,8 +13,6 @@
 #include <string.h>
 
 #include "export/exporters/exporters_internal.h"
-
-#define POSES_MOST 256 /* in one mesh: what WebGL2 holds for sure */
 
 typedef struct glb_range { /* of an accessor */
     float lo[3], hi[3];
@@ -27,12 +25,12 @@ typedef struct glb_range { /* of an accessor */
 typedef struct glb_layout {
     const npg_export_facts *facts;
     size_t vert_count;         /* G                                  */
-    size_t pose_count;         /* T of this mesh, POSES_MOST most */
+    size_t pose_count;         /* T of this mesh, NPG_GLB_POSES_MOST most */
     int64_t first_index;       /* of its frames                      */
     int64_t segment, segments; /* which of how many files            */
     bool has_uvs;
-    glb_range base, delta[POSES_MOST]; /* delta[0] is not used        */
-    float times[POSES_MOST];           /* seconds from the first pose */
+    glb_range base, delta[NPG_GLB_POSES_MOST]; /* delta[0] is not used        */
+    float times[NPG_GLB_POSES_MOST];           /* seconds from the first pose */
 } glb_layout;
 
 /* ---- the JSON part ---- */
@@ -70,7 +68,7 @@ typedef struct pieces {
 /* ---- parts ---- */
 
 /* x, y, z of the files to metres with y up. */
-static json_t *json_of_node(const npg_export_facts *facts)
+json_t *npg_glb_node(const npg_export_facts *facts)
 {
     double unit = facts->metres_per_unit;
     json_t *node = json_pack("{ss si}", "name", "capture", "mesh", 0);
@@ -164,7 +162,7 @@ static json_t *json_of(const glb_layout *layout)
         "generator", json_sprintf("neupig %s", npg_version()), "extras", "segment",
         (json_int_t)layout->segment, "segments", (json_int_t)layout->segments, "first_frame",
         (json_int_t)layout->first_index, "frames", (json_int_t)layout->pose_count, "fps", layout->facts->fps,
-        "scene", 0, "scenes", "nodes", 0, "nodes", json_of_node(layout->facts), "materials", "name",
+        "scene", 0, "scenes", "nodes", 0, "nodes", npg_glb_node(layout->facts), "materials", "name",
         "surface", "pbrMetallicRoughness", "metallicFactor", 0, "roughnessFactor", 0.9, "doubleSided", 1);
     add_mesh(root, layout);
     return root;
@@ -192,23 +190,33 @@ static npg_status make_text(char **text, size_t *length, const glb_layout *layou
     return status;
 }
 
+npg_status npg_glb_begin(npg_file *file, const json_t *root, uint64_t binary_size)
+{
+    unsigned char head[20] = "glTF", binary_head[8] = "....BIN"; /* its length comes first */
+    char *text = json_dumps(root, JSON_COMPACT | JSON_REAL_PRECISION(17));
+    if (!text) return npg_error(NPG_MEMORY, "no memory for the text of a GLB");
+    size_t length = strlen(text), padded = length + (4 - length % 4) % 4;
+    npg_put_little(head + 4, 2, 4); /* version */
+    npg_put_little(head + 8, 12 + 8 + padded + 8 + binary_size, 4);
+    npg_put_little(head + 12, padded, 4);
+    memcpy(head + 16, "JSON", 4);
+    npg_put_little(binary_head, binary_size, 4);
+    npg_file_write(file, head, sizeof head);
+    npg_file_write(file, text, length);
+    npg_file_write(file, "   ", padded - length);
+    free(text);
+    return npg_file_write(file, binary_head, sizeof binary_head);
+}
+
 /* ---- the file ---- */
 
 /* Of a file's binary part: lengths have 32 bits, and a MiB is left for the JSON. */
 #define BYTES_MOST (UINT64_C(0xffffffff) - (1 << 20))
 
-/* Vertices doubled where their corners have more than one texture coordinate. */
-typedef struct corner_split {
-    size_t count;      /* G >= V                              */
-    uint32_t *vertex;  /* G: the vertex each one is a copy of */
-    float *uvs;        /* G x 2 or NULL                       */
-    uint32_t *indices; /* F x 3 of them                       */
-} corner_split;
-
 typedef struct glb_state {
     npg_writer writer;
     npg_arena arena; /* of the split and the base */
-    corner_split split;
+    npg_corner_split split;
     size_t poses_most;      /* in one file                 */
     int64_t done, segments; /* poses so far; files in all  */
     size_t at;              /* poses in the file under way */
@@ -222,14 +230,14 @@ typedef struct glb_state {
 
 /* The copies of one vertex are a list: the vertex itself, then next[] until UINT32_MAX. */
 typedef struct splitting {
-    corner_split *split;
+    npg_corner_split *split;
     uint32_t *next;   /* one per copy                                */
     uint8_t *is_used; /* one per vertex: it has a texture coordinate */
 } splitting;
 
 static uint32_t copy_for(splitting *s, uint32_t vertex, const float uv[2])
 {
-    corner_split *split = s->split;
+    npg_corner_split *split = s->split;
     uint32_t at = vertex;
     if (!s->is_used[vertex]) {
         s->is_used[vertex] = 1;
@@ -248,20 +256,19 @@ static uint32_t copy_for(splitting *s, uint32_t vertex, const float uv[2])
     return at;
 }
 
-/* corner_uvs (F x 3 x 2) or uvs (V x 2) may be NULL; with both the corners' count.  Without corner_uvs the
- * vertices stay as they are.  Vertices that no face uses are kept. */
-static npg_status split_vertices(corner_split *split, npg_arena *arena, size_t vert_count,
-                                 const uint32_t *faces, size_t face_count, const float *uvs,
-                                 const float *corner_uvs)
+npg_status npg_split_corners(npg_corner_split *split, npg_arena *arena, const npg_export_facts *facts)
 {
+    size_t vert_count = facts->vert_count, face_count = facts->face_count;
+    const uint32_t *faces = facts->faces;
+    const float *uvs = facts->uvs, *corner_uvs = facts->corner_uvs;
     size_t most = vert_count + (corner_uvs ? 3 * face_count : 0);
     npg_arena scratch = {.purpose = NPG_FOR_FILES};
     NPG_REQUIRE(most < UINT32_MAX);
     splitting s = {split, npg_arena_take(&scratch, most, sizeof *s.next),
                    npg_arena_take(&scratch, vert_count, 1)};
-    *split = (corner_split){.count = vert_count,
-                            .vertex = npg_arena_take(arena, most, sizeof *split->vertex),
-                            .indices = npg_arena_copy(arena, faces, face_count, 3 * sizeof *faces)};
+    *split = (npg_corner_split){.count = vert_count,
+                                .vertex = npg_arena_take(arena, most, sizeof *split->vertex),
+                                .indices = npg_arena_copy(arena, faces, face_count, 3 * sizeof *faces)};
     if (uvs || corner_uvs) split->uvs = npg_arena_take(arena, most, 2 * sizeof *split->uvs);
     npg_status status = npg_arena_status(&scratch);
     if (!status) status = npg_arena_status(arena);
@@ -289,7 +296,7 @@ static uint64_t bytes_of(const npg_export_facts *facts, size_t vert_count, uint6
 
 static size_t poses_for(const npg_export_facts *facts, size_t vert_count)
 {
-    size_t poses = POSES_MOST;
+    size_t poses = NPG_GLB_POSES_MOST;
     while (poses > 1 && bytes_of(facts, vert_count, poses) > BYTES_MOST) poses--;
     return poses;
 }
@@ -452,8 +459,7 @@ static npg_status open_glb(void *state)
     glb_state *s = state;
     const npg_export_facts *facts = s->writer.facts;
     s->arena.purpose = NPG_FOR_FILES;
-    NPG_TRY(split_vertices(&s->split, &s->arena, facts->vert_count, facts->faces, facts->face_count,
-                           facts->uvs, facts->corner_uvs));
+    NPG_TRY(npg_split_corners(&s->split, &s->arena, facts));
     s->poses_most = poses_for(facts, s->split.count);
     s->segments = (facts->pose_count + (int64_t)s->poses_most - 1) / (int64_t)s->poses_most;
     s->base = npg_arena_take(&s->arena, facts->vert_count, 3 * sizeof *s->base);

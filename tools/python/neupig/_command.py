@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import functools
-import json
 import os
 import pathlib
 import shutil
 import subprocess
 import sys
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ._library import EXIT_CODES, VERSION, Error, Status, library_path
 from ._options import text_of
@@ -67,22 +66,6 @@ def synth(output: Path, **options: object) -> Capture:
     command("synth", output=output, **options)
     folder = pathlib.Path(os.fsdecode(output))
     return Capture(folder / "points", folder / "truth")
-
-
-def probe(input: Path, **options: object) -> dict[str, Any]:
-    """Look at a capture: counts, boxes, gaps, faults, and what a run would cost."""
-    return dict(json.loads(command("probe", input, json=True, **options)))
-
-
-def eval(predicted: Path, truth: Path, **options: object) -> dict[str, Any]:
-    """Measure a mesh sequence (or the output folder of a run) against a ground truth."""
-    return dict(json.loads(command("eval", predicted, truth, json=True, **options)))
-
-
-def apply(job: Path, mesh: Path, output: Path, **options: object) -> pathlib.Path:
-    """Carry another mesh, or points, through a finished run; returns the folder of the meshes."""
-    command("apply", job, mesh=mesh, output=output, **options)
-    return pathlib.Path(os.fsdecode(output))
 
 
 def render(files: Path | Iterable[Path], output: Path, **options: object) -> pathlib.Path:

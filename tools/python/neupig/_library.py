@@ -106,6 +106,49 @@ class ResultStruct(Structure):
                 ("good", c_int)]
 
 
+class CaptureFactsStruct(Structure):
+    _fields_ = [("struct_size", c_size_t),
+                *((name, c_size_t) for name in (
+                    "frames", "missing", "unreadable", "with_normals", "points_least", "points_median", "points_most",
+                    "points_total", "not_finite", "attention")),
+                ("box_low", c_double * 3), ("box_high", c_double * 3), ("bytes", c_uint64), ("vertices", c_size_t),
+                ("window", c_size_t), ("memory_bytes", c_double), ("disk_bytes", c_double), ("time_s", c_double),
+                ("text", c_char_p), ("json", c_char_p)]
+
+
+class EvalFiguresStruct(Structure):
+    _fields_ = [("struct_size", c_size_t), ("frames", c_int64),
+                *((name, c_double) for name in (
+                    "cd", "cd_to_truth", "cd_from_truth", "nc", "f", "precision", "recall", "corr")),
+                *((name, c_size_t) for name in ("vertices", "faces", "truth_vertices", "truth_faces")),
+                *((name, c_double) for name in ("diagonal", "jitter", "edge", "rigidity", "bad_area")),
+                ("constant_topology", c_int)]
+
+
+EvalFunction = CFUNCTYPE(None, c_void_p, POINTER(EvalFiguresStruct))
+
+
+class EvalSettingsStruct(Structure):
+    _fields_ = [("struct_size", c_size_t), ("predicted", c_char_p), ("truth", c_char_p), ("frames", c_char_p),
+                ("points_only", c_int), ("samples", c_size_t), ("tau", c_double), ("seed", c_uint64), ("user", c_void_p),
+                ("frame", EvalFunction)]
+
+
+class ApplySettingsStruct(Structure):
+    _fields_ = [("struct_size", c_size_t), ("job", c_char_p), ("mesh", c_char_p), ("output", c_char_p),
+                ("prefix", c_char_p), ("forms", c_char_p), ("fps_scale", c_int64), ("far_share", c_double),
+                ("overwrite", c_int)]
+
+
+class AppliedStruct(Structure):
+    _fields_ = [("struct_size", c_size_t), ("frames", c_size_t), ("point_count", c_size_t), ("far_count", c_size_t),
+                ("worst", c_size_t), ("worst_dist", c_double), ("worst_share", c_double)]
+
+
+class ExportedStruct(Structure):
+    _fields_ = [("struct_size", c_size_t), ("files", c_size_t), ("repeated", c_size_t)]
+
+
 class HitStruct(Structure):
     _fields_ = [("face", c_uint32), ("weights", c_float * 3), ("dist_sq", c_float)]
 
@@ -136,6 +179,11 @@ _FUNCTIONS = {
     "npg_run_wait": (c_int, [c_void_p]),
     "npg_run_stop": (None, [c_void_p]),
     "npg_run_close": (None, [_SLOT]),
+    "npg_capture_probe": (c_int, [POINTER(POINTER(CaptureFactsStruct)), c_void_p]),
+    "npg_capture_facts_close": (None, [POINTER(POINTER(CaptureFactsStruct))]),
+    "npg_eval": (c_int, [POINTER(EvalFiguresStruct), POINTER(EvalSettingsStruct)]),
+    "npg_apply": (c_int, [POINTER(AppliedStruct), POINTER(ApplySettingsStruct)]),
+    "npg_export": (c_int, [POINTER(ExportedStruct), c_char_p, c_char_p]),
     "npg_surface_open": (c_int, [_SLOT, POINTER(c_float), c_size_t, POINTER(c_uint32), c_size_t]),
     "npg_surface_move": (c_int, [c_void_p, POINTER(c_float)]),
     "npg_surface_closest": (c_int, [c_void_p, POINTER(HitStruct), POINTER(c_float), c_size_t]),

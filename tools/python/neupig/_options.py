@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import ctypes
+import difflib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
-from ._library import OptionInfoStruct, Status, check, lib
+from ._library import Error, OptionInfoStruct, Status, check, lib
 
 _USES = ("command", "method", "part", "program")
 _TYPES = ("flag", "int", "real", "choice", "text")
@@ -39,6 +40,12 @@ def options() -> Iterator[Option]:
         index += 1
 
 
+def nearest(name: str, names: Iterable[str]) -> str:
+    """For the end of a message: "; did you mean frames?", where one of the names is near."""
+    near = difflib.get_close_matches(name, names, 1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
 def text_of(value: object) -> bytes:
     """A value as the option tables write it."""
     if isinstance(value, bool):
@@ -60,7 +67,13 @@ class Options:
             self.set(name, value)
 
     def set(self, name: str, value: object) -> None:
-        check(lib.npg_options_set(self.handle, name.replace("_", "-").encode(), text_of(value)))
+        try:
+            check(lib.npg_options_set(self.handle, name.replace("_", "-").encode(), text_of(value)))
+        except Error as failure:
+            if not failure.message.startswith("there is no option"):
+                raise
+            known = ["progress", "stages", *(option.name.replace("-", "_") for option in options())]
+            raise Error(failure.status, f"there is no option {name}{nearest(name, known)}") from None
 
     def get(self, name: str) -> str:
         text = lib.npg_options_get(self.handle, name.replace("_", "-").encode())
