@@ -11,7 +11,7 @@ import os
 import pathlib
 import sys
 from ctypes import (CFUNCTYPE, POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int64, c_size_t,
-                    c_ubyte, c_uint32, c_void_p)
+                    c_ubyte, c_uint32, c_uint64, c_void_p)
 
 VERSION = "0.1.0"
 

@@ -29,8 +29,9 @@ def _take(verb: str, given: dict[str, object], defaults: dict[str, Any]) -> dict
 def probe(input: Path, **options: object) -> dict[str, Any]:
     """Look at a capture, as a run with these options would: counts, boxes, gaps, faults, and what it would cost."""
     facts = POINTER(native.CaptureFactsStruct)()
+    asked = Options({**options, "input": input})  # lives until the call is done
     try:
-        check(lib.npg_capture_probe(byref(facts), Options({**options, "input": input}).handle))
+        check(lib.npg_capture_probe(byref(facts), asked.handle))
         return dict(json.loads(facts.contents.json))
     finally:
         lib.npg_capture_facts_close(byref(facts))
