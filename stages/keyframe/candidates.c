@@ -110,19 +110,18 @@ static void list_candidates(choosing *c)
     }
 }
 
-/* The least of those that are better than the one by score, beyond chance. */
+/* The one of the least figure, where that is clearly better than the one by score.  Chance is not asked: a
+ * candidate does well near itself and badly far off, so the differences of two scatter whichever is better. */
 static size_t least_of(const npg_candidate *list, size_t count, size_t scored)
 {
-    size_t best = scored;
-    for (size_t i = 0; i < count; i++) {
-        if (!list[i].is_followed || i == scored) continue;
-        bool is_better = scored == count || !list[scored].is_followed ||
-                         npg_judged_better(&list[i].judgement, &list[scored].judgement);
-        bool is_least =
-            best == count || !list[best].is_followed || list[i].judgement.mean < list[best].judgement.mean;
-        if (is_better && is_least) best = i;
-    }
-    return best < count ? best : 0;
+    size_t first = scored < count ? scored : 0, best = first;
+    for (size_t i = 0; i < count; i++)
+        if (list[i].is_followed &&
+            (!list[best].is_followed || list[i].judgement.mean < list[best].judgement.mean))
+            best = i;
+    return !list[first].is_followed || npg_judged_clearly(&list[best].judgement, &list[first].judgement)
+               ? best
+               : first;
 }
 
 /* Parts that touch in one frame are joined in its surface, which is a handle more; none is ever joined too

@@ -82,8 +82,8 @@ npg_status npg_outside_restore(npg_outside *outside, const npg_record *in, const
  * The paper's score (keyframe.c) counts cells that hold a point; it hardly tells frames apart and knows
  * nothing of limbs that touch, of what a sensor did not see, or of a pose that is hard to follow from.  So
  * frames spread over the sample are tried, too: each one's points are made a draft surface, and the judge
- * (reference/reference.h) says how it fares.  The frame by score stays unless another is better beyond
- * chance, or as good with fewer handles. */
+ * (reference/reference.h) says how it fares.  The frame by score stays unless another is clearly
+ * better, or not worse beyond chance with fewer handles. */
 
 typedef struct npg_candidate {
     size_t at; /* place in the clouds */

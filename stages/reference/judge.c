@@ -5,8 +5,9 @@
 
 #include "geometry/geometry.h"
 
-#define TAU     1.0  /* times npg_cloud_spacing(), about three times the points apart: farther is no worse */
-#define CLEARLY 0.85 /* times the other's figure: tests/bed/decisions.md, "The judge" */
+#define TAU 1.0 /* times npg_cloud_spacing(), about three times the points apart: farther is no worse */
+#define CLEARLY                                                                                              \
+    0.91 /* times the other's figure, which is a tenth worse: tests/bed/decisions.md, "The judge" */
 
 /* Coarse: what a finer one forgives shows. */
 static const npg_tracker_settings judge_tracking = {
@@ -198,9 +199,14 @@ double npg_judged_against(const npg_judgement *one, const npg_judgement *other)
     return error > 0 ? mean / error : 0;
 }
 
+bool npg_judged_clearly(const npg_judgement *one, const npg_judgement *other)
+{
+    return one->mean < CLEARLY * other->mean;
+}
+
 bool npg_judged_better(const npg_judgement *one, const npg_judgement *other)
 {
-    return npg_judged_against(one, other) < -2 && one->mean < CLEARLY * other->mean;
+    return npg_judged_against(one, other) < -2 && npg_judged_clearly(one, other);
 }
 
 bool npg_judged_worse(const npg_judgement *one, const npg_judgement *other)

@@ -39,8 +39,10 @@ npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *cloud
  * mean: negative, `one` is better.  0 where fewer than three are in common. */
 double npg_judged_against(const npg_judgement *one, const npg_judgement *other);
 
-/* Whether `one` is better beyond chance, by two standard errors, and by so much that it is no matter of how
- * coarsely a surface is followed: judge.c. */
+/* Whether the figure of `one` is better by so much that it is no matter of how coarsely a surface is followed. */
+bool npg_judged_clearly(const npg_judgement *one, const npg_judgement *other);
+
+/* Whether it is, beyond chance, too: by two standard errors. */
 bool npg_judged_better(const npg_judgement *one, const npg_judgement *other);
 
 /* Whether `one` is worse beyond chance, by however little. */
