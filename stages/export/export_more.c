@@ -40,11 +40,17 @@ npg_status npg_export_open_done(json_t **done, const char *job, const char *verb
 
 /* ---- what is to be made ---- */
 
-static bool is_of(const json_t *entry, const npg_exporter *exporter)
+static bool is_called(const json_t *entry, const char *name)
 {
     const char *form = json_string_value(json_object_get(entry, "form"));
-    return form && (!strcmp(form, exporter->name) ||
-                    (exporter->with_reference && !strcmp(form, NPG_EXPORT_REFERENCE)));
+    return form && !strcmp(form, name);
+}
+
+/* One of its files, or the mesh that several formats share. */
+static bool is_of(const json_t *entry, const npg_exporter *exporter)
+{
+    return is_called(entry, exporter->name) ||
+           (exporter->with_reference && is_called(entry, NPG_EXPORT_REFERENCE));
 }
 
 /* All its files are there, as they were written. */
@@ -56,7 +62,7 @@ static bool lies_there(const more *m, const npg_exporter *exporter)
     {
         if (!is_of(entry, exporter)) continue;
         if (npg_file_check(entry, m->output, json_string_value(json_object_get(entry, "path")))) return false;
-        count++;
+        count += is_called(entry, exporter->name);
     }
     return count > 0;
 }

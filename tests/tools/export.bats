@@ -51,6 +51,9 @@ same_as_at_once() {
     cmp out/reference.obj at_once/reference.obj
     cmp out/report.json before/report.json
     [ "$("$NEUPIG" verify out)" = "out: 13 files as they were written" ]
+    "$NEUPIG" export out --export mdd # whose reference.obj lies there already, for pc2
+    cmp out/motion.mdd at_once/motion.mdd
+    [ "$("$NEUPIG" verify out)" = "out: 14 files as they were written" ]
     run "$NEUPIG" run first -o out "${small[@]}" --export npz --seed 3
     [ "$status" -eq 2 ]
     [[ "$output" == *"holds another job: option seed"* ]]
