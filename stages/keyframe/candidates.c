@@ -115,6 +115,7 @@ static void list_candidates(choosing *c)
 static size_t least_of(const npg_candidate *list, size_t count, size_t scored)
 {
     size_t first = scored < count ? scored : 0, best = first;
+    if (!count) return 0;
     for (size_t i = 0; i < count; i++)
         if (list[i].is_followed &&
             (!list[best].is_followed || list[i].judgement.mean < list[best].judgement.mean))

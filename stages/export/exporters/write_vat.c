@@ -11,23 +11,24 @@
  * file of their own until the box of all is known. */
 #include <float.h>
 #include <math.h>
+#include <png.h>
+#include <setjmp.h>
 #include <string.h>
-#include <zlib.h>
 
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
 #include "pipeline/json_file.h"
 
-#define SIDE_MOST  8192 /* texels: what engines take on every graphics card of today */
-#define CHUNK_SIZE (64 << 10)
+#define SIDE_MOST 8192 /* texels: what engines take on every graphics card of today */
+#define TEXT_SIZE 160
 
 typedef struct picture {
     npg_file *file;
-    z_stream packer;
-    bool is_open;            /* the packer */
-    unsigned char *row;      /* of texels, RGB of 16 bits; behind it the one before */
-    unsigned char *filtered; /* a byte of how, and the row */
-    unsigned char *chunk;    /* CHUNK_SIZE */
+    png_structp png;
+    png_infop info;
+    png_uint_32 width, height;
+    unsigned char *row;   /* of texels, RGB of 16 bits */
+    char text[TEXT_SIZE]; /* of libpng's error         */
 } picture;
 
 typedef struct vat_state {
@@ -67,75 +68,83 @@ static uint64_t bytes(const npg_export_facts *facts)
     return (uint64_t)facts->pose_count * facts->vert_count * 12;
 }
 
-/* ---- PNG (ISO/IEC 15948), row by row ---- */
+/* ---- pictures, row by row ---- */
 
-static void write_chunk(npg_file *file, const char *type, const unsigned char *data, size_t size)
+static void on_png_error(png_structp png, png_const_charp text)
 {
-    unsigned char word[4];
-    uLong crc = crc32(0, (const Bytef *)type, 4);
-    if (size) crc = crc32(crc, data, (uInt)size);
-    npg_file_write(file, word, npg_put_big(word, size, 4));
-    npg_file_write(file, type, 4);
-    if (size) npg_file_write(file, data, size);
-    npg_file_write(file, word, npg_put_big(word, crc, 4));
+    snprintf(png_get_error_ptr(png), TEXT_SIZE, "%s", text);
+    png_longjmp(png, 1);
+}
+
+static void on_warning(png_structp png, png_const_charp text)
+{
+    (void)png, (void)text;
+}
+
+/* A file that can't be written says so when it is committed. */
+static void put_bytes(png_structp png, png_bytep bytes, size_t size)
+{
+    npg_file_write(png_get_io_ptr(png), bytes, size);
+}
+
+static void flush_nothing(png_structp png)
+{
+    (void)png;
+}
+
+/* One step of libpng's, with its error. */
+static npg_status step_of(picture *p, void (*step)(picture *))
+{
+    if (setjmp(png_jmpbuf(p->png))) return npg_error(NPG_FAILED, "a texture: libpng: %s", p->text);
+    step(p);
+    return NPG_OK;
+}
+
+/* Rows as differences from the one above, which is the frame before where a frame is one row. */
+static void begin(picture *p)
+{
+    png_set_write_fn(p->png, p->file, put_bytes, flush_nothing);
+    png_set_IHDR(p->png, p->info, p->width, p->height, 16, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_filter(p->png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
+    png_write_info(p->png, p->info);
+}
+
+static void put_row(picture *p)
+{
+    png_write_row(p->png, p->row);
+}
+
+static void end(picture *p)
+{
+    png_write_end(p->png, NULL);
 }
 
 static npg_status open_picture(vat_state *s, int which)
 {
     picture *p = &s->pictures[which];
-    unsigned char head[13] = {0};
-    npg_put_big(head, s->width, 4);
-    npg_put_big(head + 4, s->height, 4);
-    head[8] = 16; /* bits */
-    head[9] = 2;  /* RGB  */
-    p->row = npg_arena_take(&s->arena, s->width, 12);
-    p->filtered = npg_arena_take(&s->arena, 6 * s->width + 1, 1);
-    p->chunk = npg_arena_take(&s->arena, CHUNK_SIZE, 1);
+    p->width = (png_uint_32)s->width;
+    p->height = (png_uint_32)s->height;
+    p->row = npg_arena_take(&s->arena, s->width, 6);
     NPG_TRY(npg_arena_status(&s->arena));
+    p->png = png_create_write_struct(PNG_LIBPNG_VER_STRING, p->text, on_png_error, on_warning);
+    p->info = p->png ? png_create_info_struct(p->png) : NULL;
+    if (!p->info) return npg_error(NPG_MEMORY, "no memory for %s", names[which]);
     NPG_TRY(npg_file_open_in(&p->file, s->writer.facts->output, names[which]));
-    npg_file_write(p->file, "\x89PNG\r\n\x1a\n", 8);
-    write_chunk(p->file, "IHDR", head, sizeof head);
-    p->is_open = deflateInit(&p->packer, Z_DEFAULT_COMPRESSION) == Z_OK;
-    p->packer.next_out = p->chunk;
-    p->packer.avail_out = CHUNK_SIZE;
-    return p->is_open ? NPG_OK : npg_error(NPG_MEMORY, "no memory for %s", names[which]);
-}
-
-static void pack(picture *p, int flush)
-{
-    int code;
-    do {
-        code = deflate(&p->packer, flush);
-        if (p->packer.avail_out && (flush != Z_FINISH || code != Z_STREAM_END)) continue;
-        write_chunk(p->file, "IDAT", p->chunk, CHUNK_SIZE - p->packer.avail_out);
-        p->packer.next_out = p->chunk;
-        p->packer.avail_out = CHUNK_SIZE;
-    } while (p->packer.avail_in || (flush == Z_FINISH && code != Z_STREAM_END));
-}
-
-/* As differences from the row above, which is the frame before where a frame is one row. */
-static void write_row(picture *p, size_t width)
-{
-    unsigned char *above = p->row + 6 * width;
-    p->filtered[0] = 2;
-    for (size_t i = 0; i < 6 * width; i++) p->filtered[1 + i] = (unsigned char)(p->row[i] - above[i]);
-    memcpy(above, p->row, 6 * width);
-    p->packer.next_in = p->filtered;
-    p->packer.avail_in = (uInt)(6 * width + 1);
-    pack(p, Z_NO_FLUSH);
+    return step_of(p, begin);
 }
 
 static npg_status end_picture(vat_state *s, int which)
 {
     picture *p = &s->pictures[which];
-    pack(p, Z_FINISH);
-    write_chunk(p->file, "IEND", NULL, 0);
+    NPG_TRY(step_of(p, end));
     NPG_TRY(npg_file_commit(&p->file));
     return npg_export_made(s->writer.facts, "vat", names[which], s->writer.facts->first_index, s->count);
 }
 
 /* V x 3 values, each between lo and hi of its axis. */
-static void write_frame(vat_state *s, picture *p, const float *values, const float lo[3], const float hi[3])
+static npg_status write_frame(vat_state *s, picture *p, const float *values, const float lo[3],
+                              const float hi[3])
 {
     size_t verts = s->writer.facts->vert_count;
     for (size_t row = 0; row < s->rows; row++) {
@@ -146,8 +155,9 @@ static void write_frame(vat_state *s, picture *p, const float *values, const flo
                 ((double)values[3 * row * s->width + i] - (double)lo[i % 3]) / (span > 0 ? span : 1);
             npg_put_big(p->row + 2 * i, (uint64_t)lround(65535 * fmin(fmax(share, 0), 1)), 2);
         }
-        write_row(p, s->width);
+        NPG_TRY(step_of(p, put_row));
     }
+    return NPG_OK;
 }
 
 /* ---- the mesh ---- */
@@ -288,8 +298,8 @@ static npg_status finish_vat(void *state)
     for (int64_t k = 0; k < s->count; k++) {
         NPG_TRY(npg_file_reread(s->poses, s->pos, size, (uint64_t)k * size));
         npg_mesh_vertex_normals(s->normals, s->pos, facts->vert_count, facts->faces, facts->face_count);
-        write_frame(s, &s->pictures[0], s->pos, s->lo, s->hi);
-        write_frame(s, &s->pictures[1], s->normals, low, high);
+        NPG_TRY(write_frame(s, &s->pictures[0], s->pos, s->lo, s->hi));
+        NPG_TRY(write_frame(s, &s->pictures[1], s->normals, low, high));
         if (!k) NPG_TRY(write_mesh(s));
     }
     for (int i = 0; i < 2; i++) NPG_TRY(end_picture(s, i));
@@ -300,7 +310,7 @@ static void close_vat(void *state)
 {
     vat_state *s = state;
     for (int i = 0; i < 2; i++) {
-        if (s->pictures[i].is_open) deflateEnd(&s->pictures[i].packer);
+        png_destroy_write_struct(&s->pictures[i].png, &s->pictures[i].info);
         npg_file_discard(&s->pictures[i].file);
     }
     npg_file_discard(&s->poses);
