@@ -1,11 +1,7 @@
 #!/usr/bin/env python3
-"""The guide's page of all options, from the tables of the program itself.
+"""The guide's page of all options, from the tables of the program itself: without an option it is printed."""
 
-    options_page.py build/neupig            prints the page
-    options_page.py build/neupig --check    exit code 1 where samples/guide/options.md is another
-    options_page.py build/neupig --write    writes it
-"""
-
+import argparse
 import pathlib
 import re
 import subprocess
@@ -66,15 +62,18 @@ def page_of(program: str) -> str:
 
 
 def main() -> None:
-    if len(sys.argv) < 2 or sys.argv[2:] not in ([], ["--check"], ["--write"]):
-        sys.exit(__doc__)
-    text = page_of(sys.argv[1])
-    if "--write" in sys.argv:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("program", help="build/neupig")
+    parser.add_argument("--check", action="store_true", help=f"exit code 1 where {PAGE.name} is another")
+    parser.add_argument("--write", action="store_true", help="write it")
+    asked = parser.parse_args()
+    text = page_of(asked.program)
+    if asked.write:
         PAGE.write_text(text, encoding="utf-8")
-    elif "--check" not in sys.argv:
+    elif not asked.check:
         print(text, end="")
     elif not PAGE.exists() or PAGE.read_text(encoding="utf-8") != text:
-        sys.exit(f"{PAGE} is not what {sys.argv[1]} has: tools/options_page.py {sys.argv[1]} --write")
+        sys.exit(f"{PAGE} is not what {asked.program} has: tools/options_page.py {asked.program} --write")
 
 
 if __name__ == "__main__":

@@ -94,10 +94,10 @@ copy_tree() { # FOLDER
 @test "every option that a page names is one of the command or of a script" {
     for verb in run batch append export apply probe eval synth render view bench doctor man; do "$NEUPIG" help $verb --help-all; done >known
     "$NEUPIG-bodies" 2>>known || true
-    for script in explore plot_explore figures rig_json; do "$root/tools/$script.py" --help; done >>known
+    for script in explore plot_explore figures options_page rig_json; do "$root/tools/$script.py" --help; done >>known
     # of CMake, CTest, pip, bats and others
     echo "--build --target --install --prefix --preset --config --test-dir --output-on-failure --system-site-packages --array" >>known
-    echo "--cflags --libs --list --clean --filter --tests --packages --fast --help-all" >>known
+    echo "--cflags --libs --variable --list --clean --filter --tests --packages --fast --help-all" >>known
     # an option that is on by default is listed as --no-NAME, and may be set as --NAME=no
     grep -o -e '--[a-z][a-z0-9-]*' known | sed 'p; s/^--no-/--/' | sort -u >options
     while read -r page; do
