@@ -156,6 +156,13 @@ npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
     return keep_first_of_cells(frame, &frame->cleaning.thinned, enough);
 }
 
+npg_status npg_clean_points(npg_frame *frame, double *side, size_t point_max)
+{
+    NPG_TRY(npg_clean_finite(frame));
+    NPG_TRY(npg_clean_duplicates(frame));
+    return npg_clean_cap(frame, side, point_max);
+}
+
 /* ---- is it a body? ---- */
 
 static npg_status too_few(const npg_frame *frame)

@@ -106,9 +106,7 @@ static npg_status clean_points(npg_worker *worker, npg_frame *frame)
     size_t read = frame->point_count;
     double side;
     frame->cleaning = (npg_cleaning){.read = read};
-    NPG_TRY(npg_clean_finite(frame));
-    NPG_TRY(npg_clean_duplicates(frame));
-    NPG_TRY(npg_clean_cap(frame, &side, (size_t)s->point_max));
+    NPG_TRY(npg_clean_points(frame, &side, (size_t)s->point_max));
     if (side > 0 && comes_first(worker, frame))
         npg_worker_warn(worker, false, frame->number,
                         "%zu points are more than points-max %lld: thinned to %zu, one per cube of side %g",

@@ -172,9 +172,7 @@ npg_status npg_frame_clean(npg_frame *frame, uint8_t **keep, size_t point_max, d
 {
     double side;
     *keep = NULL;
-    NPG_TRY(npg_clean_finite(frame));
-    NPG_TRY(npg_clean_duplicates(frame));
-    NPG_TRY(npg_clean_cap(frame, &side, point_max));
+    NPG_TRY(npg_clean_points(frame, &side, point_max));
     if (!frame->point_count) return NPG_OK;
     NPG_TRY(npg_alloc(keep, NPG_FOR_FRAMES, frame->point_count));
     memset(*keep, 1, frame->point_count);
