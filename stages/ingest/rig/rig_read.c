@@ -122,13 +122,18 @@ bool npg_rig_is_frame(const char *text)
     return split(path, &number, text);
 }
 
-npg_status npg_rig_up_of(npg_up *up, const char *text)
+static npg_status open_rig_of(npg_rig **rig, int64_t *number, const char *text)
 {
     char path[NPG_PATH_SIZE];
+    if (!split(path, number, text)) return npg_error(NPG_BAD_INPUT, "%s: no frame of a rig", text);
+    return npg_rig_open(rig, path, &npg_rig_usual);
+}
+
+npg_status npg_rig_up_of(npg_up *up, const char *text)
+{
     int64_t number;
     npg_rig *rig;
-    if (!split(path, &number, text)) return npg_error(NPG_BAD_INPUT, "%s: no frame of a rig", text);
-    NPG_TRY(npg_rig_open(&rig, path, &npg_rig_usual));
+    NPG_TRY(open_rig_of(&rig, &number, text));
     *up = npg_rig_up(rig);
     npg_rig_close(&rig);
     return NPG_OK;
@@ -136,13 +141,11 @@ npg_status npg_rig_up_of(npg_up *up, const char *text)
 
 npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin)
 {
-    char path[NPG_PATH_SIZE];
     int64_t number;
     npg_rig *rig;
     npg_frame frame = {0};
     *mesh = NULL;
-    if (!split(path, &number, text)) return npg_error(NPG_BAD_INPUT, "%s: no frame of a rig", text);
-    NPG_TRY(npg_rig_open(&rig, path, &npg_rig_usual));
+    NPG_TRY(open_rig_of(&rig, &number, text));
     size_t at = npg_rig_find(rig, number);
     npg_status status = at == SIZE_MAX ? npg_error(NPG_BAD_INPUT, "%s: the rig has no such frame", text)
                                        : npg_rig_read(rig, &frame, at, origin);
