@@ -1,6 +1,7 @@
 /* neupig apply: another mesh, or points, carried through all frames of a finished run. */
 #include <stddef.h>
 
+#include "export/export.h"
 #include "tools/cli.h"
 #include "tools/segments/segments.h"
 
@@ -26,8 +27,7 @@ const npg_option npg_apply_options[] = {
     NPG_ROW_REAL  ("far",       AT(far_share), "0.05",  0,     1e6,  "SHARE",
         "Points farther from the reference than this share of its diagonal are reported (exit code 7)"),
     NPG_ROW_TEXT  ("export",    AT(list),      "",      "LIST",
-        "What to write, with commas, as of neupig run: ply, obj, pc2, mdd, glb, glb-meshopt, vat, usda, npz, vdb. "
-        "Without: OBJ of an OBJ file, PLY of others"),
+        NPG_EXPORT_FORMS ": what to write, as of neupig run. Without: OBJ of an OBJ file, PLY of others"),
     NPG_ROW_TEXT  ("prefix",    AT(prefix),    "frame", "NAME",
         "First part of the files' names"),
     NPG_ROW_FLAG  ("overwrite", AT(overwrite), "no",

@@ -1,6 +1,7 @@
 /* neupig export: other formats of a run that is done. */
 #include <stddef.h>
 
+#include "export/export.h"
 #include "tools/cli.h"
 #include "tools/segments/segments.h"
 
@@ -12,7 +13,7 @@ typedef struct settings {
 const npg_option npg_export_options[] = {
     /* type        name      place                    default  shown as */
     NPG_ROW_TEXT  ("export", offsetof(settings, list), "",     "LIST",
-        "What to write, with commas, as of neupig run: ply, obj, pc2, mdd, glb, glb-meshopt, vat, usda, npz, vdb"),
+        NPG_EXPORT_FORMS ": what to write, as of neupig run"),
     {0}};
 /* clang-format on */
 

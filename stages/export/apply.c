@@ -201,12 +201,6 @@ static npg_status open_output(applying *a)
 
 /* ---- other formats ---- */
 
-static const char *option_of(const applying *a, const char *name)
-{
-    const char *text = json_string_value(json_object_get(json_object_get(a->done, "options"), name));
-    return text ? text : "";
-}
-
 static npg_status choose(applying *a)
 {
     const char *dot = strrchr(a->s->mesh, '.'), *own = dot && !strcasecmp(dot, ".obj") ? "obj" : "ply";
@@ -219,9 +213,9 @@ static npg_status begin_formats(applying *a)
     const npg_mesh *mesh = a->carried;
     npg_export_facts *f = &a->facts;
     npg_bounds bounds = npg_bounds_empty();
-    float *rest = npg_arena_copy(&a->arena, mesh->vert_pos, mesh->vert_count, 3 * sizeof *rest);
     bool is_finer = a->s->fps_scale > 1;
     if (!a->choice.chosen[0]) return NPG_OK;
+    float *rest = npg_arena_copy(&a->arena, mesh->vert_pos, mesh->vert_count, 3 * sizeof *rest);
     NPG_TRY(npg_arena_status(&a->arena));
     npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
     for (size_t i = 0; i < 3 * mesh->vert_count; i++)
@@ -242,8 +236,8 @@ static npg_status begin_formats(applying *a)
     f->pose_count = is_finer ? f->last_index + 1 : (int64_t)a->frame_count;
     f->fps = json_number_value(json_object_get(a->done, "fps")) * (double)a->s->fps_scale;
     f->metres_per_unit = json_number_value(json_object_get(a->done, "metres_per_unit"));
-    f->is_z_up = !strcmp(option_of(a, "up"), "z");
-    f->voxel_share = strtod(option_of(a, "vdb-voxel"), NULL);
+    f->is_z_up = !strcmp(npg_done_option(a->done, "up"), "z");
+    f->voxel_share = strtod(npg_done_option(a->done, "vdb-voxel"), NULL);
     f->diagonal = npg_bounds_diagonal(&bounds);
     for (int k = 0; k < 3; k++) {
         f->longest = fmax(f->longest, bounds.hi[k] - bounds.lo[k]);

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "export/export.h"
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
@@ -512,7 +513,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 static const npg_option options[] = {
     /* type               name            place             default  least  most  shown as or words */
     NPG_ROW_TEXT(         "export",       AT(exports),      "",      "LIST",
-        "ply,obj,pc2,mdd,glb,glb-meshopt,vat,usda,npz,vdb: what to write. A sequence is always there: "
+        NPG_EXPORT_FORMS ": what to write. A sequence is always there: "
         "PLY, or OBJ where the list has obj without ply"),
     NPG_ROW_TEXT(         "prefix",       AT(facts.prefix),       "frame", "NAME",
         "First part of the mesh files' names"),

@@ -4,4 +4,7 @@
 
 #include "export/files.h"
 
+/* Names of the exporters, as help has them. */
+#define NPG_EXPORT_FORMS "ply,obj,pc2,mdd,glb,glb-meshopt,vat,usda,npz,vdb"
+
 #endif

@@ -78,3 +78,9 @@ npg_status npg_done_end(const char *output, const json_t *head, bool has_exports
     if (!status) status = npg_file_remove(output, NPG_EXPORT_LIST_NAME);
     return status ? status : npg_file_remove(output, NPG_FRAME_LOG_NAME);
 }
+
+const char *npg_done_option(const json_t *done, const char *name)
+{
+    const char *text = json_string_value(json_object_get(json_object_get(done, "options"), name));
+    return text ? text : "";
+}

@@ -21,12 +21,6 @@ typedef struct more {
     npg_arena arena;
 } more;
 
-static const char *option_of(const more *m, const char *name)
-{
-    const char *text = json_string_value(json_object_get(json_object_get(m->done, "options"), name));
-    return text ? text : "";
-}
-
 npg_status npg_export_open_done(json_t **done, const char *job, const char *verb)
 {
     *done = NULL;
@@ -93,13 +87,13 @@ static npg_status choose(more *m, const char *list)
 /* Texture coordinates of corners, and the lines of an OBJ: of the user's own mesh, which must be that of then. */
 static npg_status open_like(more *m)
 {
-    const char *path = option_of(m, "reference"), *format = path[0] ? npg_reader_for(path) : NULL;
+    const char *path = npg_done_option(m->done, "reference"), *format = path[0] ? npg_reader_for(path) : NULL;
     npg_export_facts *f = &m->facts;
     npg_placement map;
     npg_origin origin = {.known = true};
     size_t faces = f->face_count;
     if (!format || strcmp(format, "obj") != 0) return NPG_OK;
-    NPG_TRY(npg_placement_parse(&map, option_of(m, "axes")));
+    NPG_TRY(npg_placement_parse(&map, npg_done_option(m->done, "axes")));
     NPG_TRY(
         npg_error_prefix(npg_read_mesh(&m->like, path, &origin), "the run's own reference mesh is needed"));
     uint32_t *placed = npg_arena_take(&m->arena, m->like->face_count, 3 * sizeof *placed);
@@ -120,7 +114,7 @@ static npg_status open_like(more *m)
 static npg_status note_number(void *user, const json_t *frame, const char *line, size_t size)
 {
     more *m = user;
-    const char *name = strcmp(option_of(m, "numbering"), "index") != 0 ? "number" : "index";
+    const char *name = strcmp(npg_done_option(m->done, "numbering"), "index") != 0 ? "number" : "index";
     int width = npg_number_width(json_integer_value(json_object_get(frame, name)));
     (void)line, (void)size;
     if (width > m->facts.width) m->facts.width = width;
@@ -142,22 +136,22 @@ static npg_status open_facts(more *m)
     const npg_mesh *reference = m->reference;
     m->facts = (npg_export_facts){
         .output = m->output,
-        .prefix = option_of(m, "prefix"),
+        .prefix = npg_done_option(m->done, "prefix"),
         .vert_count = reference->vert_count,
         .face_count = reference->face_count,
         .faces = reference->faces,
         .rest = reference->vert_pos,
         .colours = reference->vert_colours,
         .uvs = reference->vert_uvs,
-        .has_normals = !strcmp(option_of(m, "mesh-normals"), "yes"),
-        .has_pose_colours = reference->vert_colours && !strcmp(option_of(m, "colour"), "frames"),
+        .has_normals = !strcmp(npg_done_option(m->done, "mesh-normals"), "yes"),
+        .has_pose_colours = reference->vert_colours && !strcmp(npg_done_option(m->done, "colour"), "frames"),
         .fps = json_number_value(json_object_get(m->done, "fps")),
         .metres_per_unit = json_number_value(json_object_get(m->done, "metres_per_unit")),
         .is_z_up = up && !strcmp(up, "z"),
         .largest = box_of(m, "box.largest"),
         .diagonal = box_of(m, "box.diagonal"),
         .longest = box_of(m, "box.longest"),
-        .voxel_share = strtod(option_of(m, "vdb-voxel"), NULL)};
+        .voxel_share = strtod(npg_done_option(m->done, "vdb-voxel"), NULL)};
     if (!(m->facts.longest > 0) || !(m->facts.fps > 0) || !m->facts.prefix[0])
         return npg_error(NPG_BAD_INPUT, "%s/done.json does not say how large the capture is; run it again",
                          m->output);

@@ -13,6 +13,7 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 
+#include "export/export.h"
 #include "export/exporters/exporters_internal.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
@@ -126,6 +127,14 @@ static float float_at(const unsigned char *bytes, size_t at)
 }
 
 /* ---- choosing ---- */
+
+static void help_names_all_of_the_table(void **state)
+{
+    char all[256] = "";
+    (void)state;
+    for (int i = 0; npg_exporters[i]; i++) strcat(strcat(all, i ? "," : ""), npg_exporters[i]->name);
+    assert_string_equal(all, NPG_EXPORT_FORMS);
+}
 
 static void the_list_says_what_is_made(void **state)
 {
@@ -612,6 +621,7 @@ static void clearing_leaves_what_is_not_ours(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(help_names_all_of_the_table),
         cmocka_unit_test(the_list_says_what_is_made),
         cmocka_unit_test(what_is_no_form_is_refused),
         cmocka_unit_test(what_a_form_can_not_hold_is_refused),

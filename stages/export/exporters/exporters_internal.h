@@ -201,6 +201,9 @@ npg_status npg_done_end(const char *output, const json_t *head, bool has_exports
  * (json_decref). */
 npg_status npg_export_open_done(json_t **done, const char *job, const char *verb);
 
+/* An option of the run, as its done.json has it; "" where it has none. */
+const char *npg_done_option(const json_t *done, const char *name);
+
 /* npg_export() by one who has the job's lock. */
 npg_status npg_export_locked(npg_exported *made, const char *output, const char *list);
 

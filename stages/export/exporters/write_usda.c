@@ -210,7 +210,8 @@ static npg_status write_pose(void *state, const npg_pose *pose)
     s->pos[2] = oldest;
     s->index[2] = pose->index;
     memcpy(s->pos[2], pose->pos, facts->vert_count * 3 * sizeof(float));
-    npg_mesh_vertex_normals(s->normals, pose->pos, facts->vert_count, facts->faces, facts->face_count);
+    if (!pose->normals)
+        npg_mesh_vertex_normals(s->normals, pose->pos, facts->vert_count, facts->faces, facts->face_count);
     NPG_TRY(print_sample(s->parts[NORMALS], pose->index, "%.6g", pose->normals ? pose->normals : s->normals,
                          facts->vert_count));
     NPG_TRY(write_extent(s));
