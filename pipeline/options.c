@@ -335,6 +335,7 @@ static npg_status set_method(npg_options *options, const char *value)
 {
     if (value[strspn(value, " \t\r\n")] == '{') return apply_text(options, value);
     if (strpbrk(value, "./")) return npg_options_load(options, value);
+    if (!strcmp(value, "best")) return npg_error(NPG_USAGE, "method best went: --effort best");
     return npg_error(NPG_USAGE,
                      "option method: \"%s\" is no method (neupig help method lists them), no file.json and "
                      "no JSON object",
@@ -345,7 +346,7 @@ static bool is_method_text(const char *name, const char *value)
 {
     if (strcmp(plain_name(name), "method") != 0) return false;
     for (const npg_preset *preset = npg_presets; preset->name; preset++)
-        if (!strcmp(preset->name, value)) return false;
+        if (!strcmp(preset->option, "method") && !strcmp(preset->name, value)) return false;
     return true;
 }
 
@@ -385,16 +386,20 @@ bool npg_options_is_set(const npg_options *options, const char *name)
     return find_option(options, name, &at) && options->texts[at];
 }
 
-static const char *text_of_preset(const npg_options *options, const char *name)
+static bool is_chosen(const npg_options *options, const npg_preset *preset)
 {
     size_t at;
-    const npg_option *method = find_option(options, "method", &at);
-    const char *chosen = options->texts[at] ? options->texts[at] : method->default_text;
-    for (const npg_preset *preset = npg_presets; preset->name; preset++) {
-        if (strcmp(preset->name, chosen) != 0) continue;
-        for (const npg_preset_value *value = preset->values; value->name; value++)
+    const npg_option *option = find_option(options, preset->option, &at);
+    const char *text = !option ? NULL : options->texts[at] ? options->texts[at] : option->default_text;
+    return text && !strcmp(text, preset->name);
+}
+
+static const char *text_of_preset(const npg_options *options, const char *name)
+{
+    for (const npg_preset *preset = npg_presets; preset->name; preset++)
+        for (const npg_preset_value *value = preset->values; value->name && is_chosen(options, preset);
+             value++)
             if (!strcmp(value->name, name)) return value->value;
-    }
     return NULL;
 }
 

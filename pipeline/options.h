@@ -74,14 +74,14 @@ extern const npg_option_list npg_option_lists[];
 /* The list of this name, or whose part this is; NULL: none. */
 const npg_option_list *npg_option_list_of(const char *name);
 
-/* A named method: values of options; what the user sets himself wins.  The list ends with a name
- * of NULL, as does each set. */
+/* A word of the options method or effort that stands for values of others; what the user sets himself wins, and a
+ * method over an effort.  The list ends with a name of NULL, as does each set. */
 typedef struct npg_preset_value {
     const char *name, *value;
 } npg_preset_value;
 
 typedef struct npg_preset {
-    const char *name, *help;
+    const char *option, *name, *help; /* option: whose word the name is */
     const npg_preset_value *values;
 } npg_preset;
 

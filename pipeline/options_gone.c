@@ -6,7 +6,7 @@
 /* clang-format off */
 static const char *const gone[][2] = { /* "VERB NAME": of that verb alone */
     {"welds",          "nothing is cut: it took limbs, and improved no figure"},
-    {"quality",        "--method best"},
+    {"quality",        "--effort best"},
     {"config",         "--method FILE"},
     {"voxel",              "thin the capture before the run; points-max of the method thins what is too dense"},
     {"outlier-neighbours", "always 12"},

@@ -32,9 +32,13 @@ const npg_option npg_run_options[] = {
         "Colours of points that have any. One per vertex, the robust mean of all frames that saw it "
         "(reference), as each frame saw it (frames), or none (no)"),
     NPG_ROW_CHOICE(       "method",     AT(method),         "default",
-        "default|best|paper|paper-1000|grids",
+        "default|paper|paper-1000|grids",
         "How it is done: a name, a JSON file, or '{\"KEY\": VALUE}'. Several add up; neupig help method "
         "lists names and keys"),
+    NPG_ROW_CHOICE(       "effort",     AT(effort),         "usual",     "quick|usual|best",
+        "How long may be looked for the reference. A first look, from one frame that is not compared with others "
+        "(quick); all frames' points, and another keyframe where frames fail with the one chosen (usual); these "
+        "points gathered twice, and more keyframes (best)"),
     NPG_ROW_TEXT(         "device",     AT(device),         "auto",      "DEVICE",
         "OpenCL device, for the methods paper and grids. Part of its name, its number, or auto (neupig "
         "doctor lists them)"),
@@ -212,9 +216,10 @@ static void join_workers(npg_run *run)
     }
 }
 
+/* Against the data's way: what a pass came to is known at its end, what follows from it is done at its beginning. */
 static npg_status settle_pass(npg_run *run)
 {
-    for (size_t i = 0; i < run->worker_count; i++) {
+    for (size_t i = run->worker_count; i-- > 0;) {
         npg_worker *worker = &run->workers[i];
         if (worker->started && worker->stage->settle) NPG_TRY(worker->stage->settle(worker));
     }

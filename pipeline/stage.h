@@ -22,7 +22,8 @@ typedef enum npg_colour_mode { NPG_COLOUR_REFERENCE, NPG_COLOUR_FRAMES, NPG_COLO
 typedef struct npg_settings {
     const char *input, *follow, *output, *device;
     const char *reference; /* the user's own mesh; "": one is to be made */
-    int method, colour;    /* place of its word; npg_colour_mode */
+    int method, effort;    /* places of their words */
+    int colour;            /* npg_colour_mode */
     int64_t seed;
     int64_t ring_capacity;  /* chunks per ring                       */
     int64_t chunk_frames;   /* frames per chunk                      */
@@ -49,6 +50,8 @@ typedef struct npg_choice {
     size_t count, candidate_count; /* count 0: there is no choosing pass */
     int64_t frames[NPG_CHOICE_FRAMES];
     bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
+    int64_t ranked[NPG_CHOICE_MAX];       /* keyframes to try where the one chosen fails, the best first */
+    size_t ranked_count;
 } npg_choice;
 
 /* Whether the frame with this index is one of the candidates. */
@@ -65,8 +68,10 @@ typedef struct npg_brief {
     int64_t
         rounds_left; /* fusing passes that are still to be walked: each follows the reference so far through
                                all frames and gathers their points for the next one */
-    bool takes_gathered; /* the next reference is made from what was gathered, and the poses found are good to
-                               start from; false: from the keyframe alone, and frames are followed anew */
+    int64_t key;     /* index of the keyframe; negative: as planned */
+    bool is_attempt; /* ... of which it is to be seen whether it does better than the one before */
+    bool takes_gathered; /* the next reference is made from what was gathered ...   */
+    bool takes_poses;    /* ... and the poses found are good to start from; else frames are followed anew */
     int64_t gathers_from, gathers_to; /* index of the first and last frame whose points are gathered */
     bool trims_only;        /* ... is the one so far, without what the frames that were followed contradict */
     bool is_side;           /* the reference is a side of the body, of which sensors see a part in a frame */
@@ -113,6 +118,7 @@ typedef struct npg_facts {
     /* evaluate, at the end of a fusing pass and of the solving one; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */
+    int64_t unfit_count;   /* of a fusing pass: frames below the bar by themselves */
     /* job, before the first pass */
     bool is_resumed;       /* all facts above are known; only the solving pass is walked */
     int64_t resumed_read;  /* frames of the plan that need not be read again             */
@@ -157,8 +163,8 @@ typedef struct npg_stage {
     npg_status (*process)(npg_worker *worker, npg_chunk **chunk);
     /* The stream ended: push on what was held back.  May be NULL. */
     npg_status (*flush)(npg_worker *worker);
-    /* All stages have ended the pass well, and none is closed yet; on the run's own thread: what the pass
-     * came to, and what follows from it for the next.  May be NULL. */
+    /* All stages have ended the pass well, and none is closed yet; on the run's own thread, those behind first:
+     * what the pass came to, and what follows from it for the next.  May be NULL. */
     npg_status (*settle)(npg_worker *worker);
     /* Free everything, after success and failure alike.  May be NULL. */
     void (*uninit)(npg_worker *worker);

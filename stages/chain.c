@@ -37,20 +37,24 @@ static const npg_preset_value grids[] = {
     {"mlp-rate",  "0.004"},
     {"epochs",    "100"},
     {NULL, NULL}};
+static const npg_preset_value quick[] = {
+    {"keyframe-choice", "paper"}, {"reference-from", "key"}, {NULL, NULL}};
 static const npg_preset_value best[] = {
     {"reference-rounds", "2"}, /* a finer graph gains nothing: tests/bed/decisions.md */
+    {"attempts", "4"},
     {NULL, NULL}};
 static const npg_preset_value none[] = {
     {NULL, NULL}};
 /* clang-format on */
 
 const npg_preset npg_presets[] = {
-    {"default", "alignment frame by frame, then a joint fit of windows of frames", none},
-    {"best", "the same, the points of all frames gathered twice for the reference: slower, closer", best},
-    {"paper", "the method as the paper has it: every vertex, from the reference, all frames at once up to 60",
-     paper},
-    {"paper-1000", "the same with its 1000 epochs", paper_1000},
-    {"grids",
+    {"method", "default", "alignment frame by frame, then a joint fit of windows of frames", none},
+    {"method", "paper",
+     "the method as the paper has it: every vertex, from the reference, all frames at once up to 60", paper},
+    {"method", "paper-1000", "the same with its 1000 epochs", paper_1000},
+    {"method", "grids",
      "the same as default, the fit of windows by the paper's grids and decoder over the aligned poses",
      grids},
-    {NULL, NULL, NULL}};
+    {"effort", "quick", "the reference from one frame, which is not compared with others", quick},
+    {"effort", "best", "points gathered twice, and four other keyframes where frames fail", best},
+    {NULL, NULL, NULL, NULL}};

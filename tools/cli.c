@@ -50,7 +50,7 @@ static const struct {
     {"Frames", "*frames missing keep-going confine cache *follow follow-end look-ahead"},
     {"Sensors", "*sensor sensor-poses align-sensors depth-range background"},
     {"Points", "outliers normals"},
-    {"Reference", "*reference keyframe *faces unseen colour"},
+    {"Reference", "*reference keyframe effort *faces unseen colour"},
     {"Method", "*method device seed"},
     {"Result", "*output *export prefix numbering scale axes up unit centre fps overwrite *restart"},
     {"Judged", "bars *segments"},

@@ -158,7 +158,7 @@ void npg_help_method(void)
           "several add up.\n\nNames:\n",
           stdout);
     for (const npg_preset *preset = npg_presets; preset->name; preset++)
-        printf("  %-26s%s\n", preset->name, preset->help);
+        if (!strcmp(preset->option, "method")) printf("  %-26s%s\n", preset->name, preset->help);
     fputs("\nKeys, beside all options of neupig run:\n", stdout);
     each_row(NPG_USE_METHOD, NULL, print_row);
 }
@@ -317,6 +317,7 @@ static void put_methods(void)
 {
     fputs(".SH METHODS\nNames and keys of the option method.\n", stdout);
     for (const npg_preset *preset = npg_presets; preset->name; preset++) {
+        if (strcmp(preset->option, "method") != 0) continue;
         printf(".TP\n.B %s\n", preset->name);
         put_text(preset->help);
         putchar('\n');

@@ -61,7 +61,7 @@ static npg_status open_known(npg_pose_cache *c, npg_worker *worker, const npg_tr
 {
     between *b = npg_worker_kept(worker);
     npg_job *job = npg_job_of(worker);
-    if (b && !npg_worker_facts(worker)->brief.takes_gathered) drop(b); /* stretched to what is new */
+    if (b && !npg_worker_facts(worker)->brief.takes_poses) drop(b); /* another key's, or stretched */
     if (b && b->store) {
         NPG_TRY(npg_pose_map_open(&c->map, b->tracker, tracker));
         c->known = b->store;

@@ -35,7 +35,8 @@ typedef struct evaluate_state {
     npg_measure *measure; /* opened for the first frame that has a mesh */
     npg_verdict verdict;
     aggregate sums[NPG_FIGURE_ROWS];
-    int64_t *bad; /* numbers of the frames below the bar; owned */
+    int64_t *bad;        /* numbers of the frames below the bar; owned */
+    int64_t unfit_count; /* of a fusing pass */
     size_t bad_count, bad_capacity, good_count, skipped_count;
     fault worst; /* of the bad ones, by how often it is the bar */
     int64_t worst_number;
@@ -248,10 +249,25 @@ static void report_verdict(json_t *report, const evaluate_state *state)
     json_object_set_new(report, "verdict", json_string(text));
 }
 
+/* Of a fusing pass nobody is told but the reference's owner. */
+static void note_unfit(npg_worker *worker, const npg_frame *frame)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    if (frame->is_shared || frame->is_skipped || isnan(frame->figures.coverage)) return;
+    state->unfit_count += fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share).kind != 0;
+}
+
+static npg_status end_fusing(npg_worker *worker)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    *npg_own(worker, unfit_count) = state->unfit_count;
+    return npg_topology_finish(&state->watch, worker);
+}
+
 static npg_status flush(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
-    if (npg_worker_pass(worker) == NPG_PASS_FUSE) return npg_topology_finish(&state->watch, worker);
+    if (npg_worker_pass(worker) == NPG_PASS_FUSE) return end_fusing(worker);
     NPG_TRY(judge_together(worker));
     json_t *report = npg_worker_report(worker), *bad = json_array();
     if (state->bad_count) qsort(state->bad, state->bad_count, sizeof *state->bad, npg_order_int64);
@@ -320,7 +336,10 @@ static npg_status see_frame(npg_worker *worker, npg_frame *frame)
     if (frame->vert_unit && (!is_judged || frame->fields & NPG_FIELD_VERTICES))
         NPG_TRY(measure_frame(worker, frame));
     if (is_judged) frame->fields |= NPG_FIELD_FIGURES;
-    if (is_judged) NPG_TRY(take_frame(worker, frame, true));
+    if (is_judged)
+        NPG_TRY(take_frame(worker, frame, true));
+    else
+        note_unfit(worker, frame);
     return npg_topology_add(&state->watch, worker, frame);
 }
 

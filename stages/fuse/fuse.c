@@ -24,6 +24,7 @@
 #include "pipeline/options.h"
 #include "pipeline/order.h"
 #include "reference/loop.h"
+#include "track/track.h"
 
 /* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
 #define POINTS_A_CELL 1    /* that a cell should average, from all frames ...                        */
@@ -55,8 +56,8 @@
 enum { FROM_KEY, FROM_ALL };
 
 typedef struct state {
-    int from;       /* option */
-    int64_t rounds; /* option */
+    int from;                 /* option */
+    int64_t rounds, attempts; /* options */
     int64_t usable; /* frames with points, and most sensors and images of one: of the measuring pass */
     size_t sensors, views;
     npg_skin *skin;
@@ -81,6 +82,9 @@ static const npg_option options[] = {
         "or those of all frames (of a live source those of the look-ahead), brought to its pose"),
     NPG_KEY(INT,    "reference-rounds", AT(rounds), "1",   1, 20, "N",
         "Times that the points of all frames are gathered with the reference so far"),
+    NPG_KEY(INT,    "attempts",         AT(attempts), "1", 0, NPG_ATTEMPTS_MOST, "N",
+        "Other keyframes that are tried where frames are below the bar with the one chosen; "
+        "the one with the fewest such frames is kept"),
     {0}};
 /* clang-format on */
 
@@ -313,6 +317,24 @@ static npg_status collect_votes(const npg_worker *worker, npg_fused *fused)
     return npg_votes_count(s->votes, fused->is_contradicted, CONTRADICTED);
 }
 
+static void report_gathered(npg_worker *worker, const npg_fused *fused)
+{
+    const state *s = npg_worker_state(worker);
+    json_t *report = npg_worker_report(worker);
+    json_object_update_new(report, json_pack("{sI sI sI sI sI sI sf}", "frames", (json_int_t)s->frames,
+                                             "frames_misaligned", (json_int_t)s->misaligned, "passes_grown",
+                                             (json_int_t)npg_worker_facts(worker)->brief.growing_passes,
+                                             "points", (json_int_t)s->points, "points_stray",
+                                             (json_int_t)s->strays, "points_fused", (json_int_t)fused->count,
+                                             "cell_unit", fused->spacing_unit));
+    if (fused->empty)
+        json_object_set_new(report, "cells_seen_empty", json_integer((json_int_t)fused->empty_count));
+    npg_worker_log(worker, NPG_LOG_INFO, -1,
+                   "%lld points of %lld frames in the keyframe's pose: %zu means over %.5f units",
+                   (long long)(s->points - s->strays), (long long)s->frames, fused->count,
+                   fused->spacing_unit);
+}
+
 static npg_status publish(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
@@ -326,20 +348,7 @@ static npg_status publish(npg_worker *worker)
         npg_fused_close(&fused);
         return status;
     }
-    json_t *report = npg_worker_report(worker);
-    json_object_set_new(report, "frames", json_integer(s->frames));
-    json_object_set_new(report, "frames_misaligned", json_integer(s->misaligned));
-    json_object_set_new(report, "passes_grown", json_integer(npg_worker_facts(worker)->brief.growing_passes));
-    json_object_set_new(report, "points", json_integer(s->points));
-    json_object_set_new(report, "points_stray", json_integer(s->strays));
-    json_object_set_new(report, "points_fused", json_integer((json_int_t)fused->count));
-    json_object_set_new(report, "cell_unit", json_real(fused->spacing_unit));
-    if (fused->empty)
-        json_object_set_new(report, "cells_seen_empty", json_integer((json_int_t)fused->empty_count));
-    npg_worker_log(worker, NPG_LOG_INFO, -1,
-                   "%lld points of %lld frames in the keyframe's pose: %zu means over %.5f units",
-                   (long long)(s->points - s->strays), (long long)s->frames, fused->count,
-                   fused->spacing_unit);
+    report_gathered(worker, fused);
     return npg_worker_publish(worker, &npg_fact_fused, fused);
 }
 
@@ -380,25 +389,78 @@ static npg_status begin(npg_worker *worker)
     return NPG_OK;
 }
 
-/* The pass's points are gathered as what comes next needs them. */
-static npg_status settle(npg_worker *worker)
+static npg_pass_result result_of(const npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return begin(worker);
-    const npg_pass_result result = {.unreached_count = facts->unreached_count,
-                                    .has_changed = npg_facts_has_changed(facts),
-                                    .explained_from = facts->has_changed[1] ? facts->changed_at[1] + 1 : 0,
-                                    .explained_to = facts->has_changed[0] ? facts->changed_at[0] - 1
-                                                                          : facts->planned_count - 1,
-                                    .is_side = s->grow_dist > 0,
-                                    .has_images = s->votes != NULL};
-    *npg_own(worker, brief) = npg_reference_next(npg_worker_kept(worker), &result);
-    if (result.unreached_count)
+    int64_t last = facts->planned_count - 1;
+    npg_pass_result result = {.key = facts->plan.key,
+                              .unreached_count = facts->unreached_count,
+                              .has_changed = npg_facts_has_changed(facts),
+                              .explained_from = facts->has_changed[1] ? facts->changed_at[1] + 1 : 0,
+                              .explained_to = facts->has_changed[0] ? facts->changed_at[0] - 1 : last,
+                              .is_side = s->grow_dist > 0,
+                              .has_images = s->votes != NULL};
+    result.bad_count = facts->unfit_count + last - result.explained_to + result.explained_from;
+    return result;
+}
+
+/* What each keyframe came to, where more than one was tried. */
+static void report_attempts(npg_worker *worker, const npg_reference_loop *loop)
+{
+    const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
+    json_t *list = json_array();
+    for (size_t i = 0; i < loop->tried_count; i++) {
+        const npg_pass_result *one = &loop->tried[i];
+        size_t at = npg_candidate_clouds_find(clouds, one->key);
+        json_array_append_new(list, json_pack("{sI sI sb}", "keyframe", (json_int_t)clouds->list[at].number,
+                                              "frames_bad", (json_int_t)one->bad_count, "kept",
+                                              loop->is_settled && i == loop->kept));
+    }
+    json_object_set_new(npg_worker_report(worker), "attempts", list);
+    npg_worker_log(worker, NPG_LOG_INFO, -1, "with this keyframe %lld frames are below the bar: %s",
+                   (long long)loop->tried[loop->tried_count - 1].bad_count,
+                   !loop->is_settled                ? "another is tried"
+                   : npg_reference_keeps_last(loop) ? "it is kept"
+                                                    : "the one before is taken back");
+}
+
+static void tell(npg_worker *worker, const npg_reference_loop *loop, const npg_pass_result *result)
+{
+    const npg_brief *brief = &loop->brief;
+    if (brief->is_attempt || loop->tried_count > 1) report_attempts(worker, loop);
+    if (!brief->is_attempt && !brief->takes_gathered)
+        npg_worker_log(worker, NPG_LOG_INFO, -1,
+                       "the keyframe's surface does not explain all frames: what others show is left out");
+    if (result->unreached_count)
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "%lld frames see too much that the reference does not have yet%s",
-                       (long long)result.unreached_count,
-                       facts->brief.is_growing ? ": it grows, and they are followed again" : "");
+                       (long long)result->unreached_count,
+                       brief->is_growing ? ": it grows, and they are followed again" : "");
+}
+
+/* The pass's points are gathered as what comes next needs them; what was gathered for a keyframe that does better
+ * stays. */
+static npg_status settle(npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    const npg_choice *choice = &npg_worker_facts(worker)->choice;
+    npg_reference_loop *loop = npg_worker_kept(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return begin(worker);
+    npg_fused *before = npg_worker_take_fact(worker, &npg_fact_fused);
+    bool was_open = !loop->is_settled;
+    if (!loop->tried_count)
+        npg_reference_offer(loop, choice->ranked,
+                            choice->ranked_count < (size_t)s->attempts ? choice->ranked_count
+                                                                       : (size_t)s->attempts);
+    const npg_pass_result result = result_of(worker);
+    *npg_own(worker, brief) = npg_reference_next(loop, &result);
+    if (before && was_open && !npg_reference_keeps_last(loop)) {
+        tell(worker, loop, &result);
+        return npg_worker_publish(worker, &npg_fact_fused, before);
+    }
+    npg_fused_close(&before);
+    tell(worker, loop, &result);
     return publish(worker);
 }
 

@@ -2,6 +2,8 @@
 #include "keyframe/keyframe_internal.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "geometry/geometry.h"
 #include "mesh/surface.h"
@@ -159,6 +161,35 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
     return status;
 }
 
+/* ---- those that are left ---- */
+
+static int by_figure(const void *left, const void *right)
+{
+    const npg_candidate *a = left, *b = right;
+    return (a->judgement.mean > b->judgement.mean) - (a->judgement.mean < b->judgement.mean);
+}
+
+void npg_candidates_rank(npg_choice *choice, const npg_candidate *list, size_t count, int64_t key)
+{
+    npg_candidate sorted[NPG_CHOICE_MAX];
+    choice->ranked_count = 0;
+    memcpy(sorted, list, count * sizeof *sorted);
+    qsort(sorted, count, sizeof *sorted, by_figure);
+    for (size_t i = 0; i < count; i++)
+        if (sorted[i].is_followed && sorted[i].index != key)
+            choice->ranked[choice->ranked_count++] = sorted[i].index;
+}
+
+/* Where none was compared: spread evenly over the sample. */
+static void spread_candidates(npg_choice *choice, const npg_candidate_clouds *clouds, int64_t key)
+{
+    size_t count = clouds->count < NPG_CHOICE_MAX ? clouds->count : NPG_CHOICE_MAX;
+    for (size_t i = 0; i < count; i++) {
+        int64_t index = clouds->list[(2 * i + 1) * clouds->count / (2 * count)].index;
+        if (index != key) choice->ranked[choice->ranked_count++] = index;
+    }
+}
+
 /* ---- the pass ---- */
 
 npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, npg_chunk *chunk)
@@ -197,19 +228,23 @@ static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_c
     NPG_TRY(npg_candidates_try(list, &count, &best, clouds, facts->plan.key, &settings));
     if (!count) return NPG_OK;
     *chosen = list[best];
+    npg_candidates_rank(npg_own(worker, choice), list, count, chosen->index);
     report_candidates(worker, list, count, npg_clock_s() - since);
     npg_worker_log(worker, NPG_LOG_INFO, chosen->number, "is the keyframe, of %zu candidates (judged %.3f)",
                    count, chosen->judgement.mean);
     return NPG_OK;
 }
 
-npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, npg_candidate *chosen)
+npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, bool is_open, npg_candidate *chosen)
 {
     const npg_choice *choice = &npg_worker_facts(worker)->choice;
     npg_candidate_clouds *clouds = pass->clouds;
     *chosen = (npg_candidate){.index = -1};
     if (!clouds || !clouds->count) return NPG_OK;
-    if (choice->candidate_count > 1) NPG_TRY(compare(worker, chosen, clouds));
+    if (choice->candidate_count > 1)
+        NPG_TRY(compare(worker, chosen, clouds));
+    else if (is_open)
+        spread_candidates(npg_own(worker, choice), clouds, npg_worker_facts(worker)->plan.key);
     pass->clouds = NULL; /* the run's, from here on */
     return npg_worker_publish(worker, &npg_fact_candidate_clouds, clouds);
 }

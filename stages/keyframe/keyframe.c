@@ -342,7 +342,7 @@ static npg_status close_choosing(npg_worker *worker)
     const npg_facts *facts = npg_worker_facts(worker);
     json_t *report = npg_worker_report(worker), *by_score = json_object_get(report, "key");
     npg_candidate chosen;
-    NPG_TRY(npg_choose_pass_end(&state->choosing, worker, &chosen));
+    NPG_TRY(npg_choose_pass_end(&state->choosing, worker, has_candidates(worker), &chosen));
     if (chosen.index < 0 || chosen.index == facts->plan.key) return NPG_OK;
     json_object_set(report, "key_by_score", by_score);
     npg_own(worker, plan)->key = chosen.index;
@@ -350,6 +350,23 @@ static npg_status close_choosing(npg_worker *worker)
                         json_pack("{sI sI sf}", "index", (json_int_t)chosen.index, "number",
                                   (json_int_t)chosen.number, "judged", chosen.judgement.mean));
     report_windows(worker); /* they lie around the keyframe */
+    return NPG_OK;
+}
+
+/* ---- another keyframe, where the reference's owner wants one ---- */
+
+static npg_status settle(npg_worker *worker)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
+    int64_t key = facts->brief.key;
+    if (npg_worker_pass(worker) != NPG_PASS_FUSE || key < 0 || key == facts->plan.key) return NPG_OK;
+    int64_t number = clouds->list[npg_candidate_clouds_find(clouds, key)].number;
+    npg_own(worker, plan)->key = key;
+    json_object_set_new(npg_worker_report(worker), "key",
+                        json_pack("{sI sI}", "index", (json_int_t)key, "number", (json_int_t)number));
+    report_windows(worker);
+    npg_worker_log(worker, NPG_LOG_INFO, number, "is the keyframe now");
     return NPG_OK;
 }
 
@@ -508,6 +525,7 @@ const npg_stage npg_stage_keyframe = {.name = "keyframe",
                                       .init = init,
                                       .process = process,
                                       .flush = flush,
+                                      .settle = settle,
                                       .uninit = uninit,
                                       .expects = expects,
                                       .save = save};

@@ -103,6 +103,9 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
                               const npg_candidate_clouds *clouds, int64_t scored,
                               const npg_poisson_settings *settings);
 
+/* choice->ranked: the candidates other than `key` that could be followed, the best first. */
+void npg_candidates_rank(npg_choice *choice, const npg_candidate *list, size_t count, int64_t key);
+
 /* Choosing pass: reads the frames of facts.choice, and takes the best of its candidates for the keyframe. */
 
 /* The frames read so far; zeroed before the pass. */
@@ -113,10 +116,12 @@ typedef struct npg_choose_pass {
 /* Remember what the frames of a chunk show.  NPG_MEMORY. */
 npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, npg_chunk *chunk);
 
-/* The end of the pass: *chosen gets the candidate to take, chosen->index -1 where the frame by score stays.
+/* The end of the pass: *chosen gets the candidate to take, chosen->index -1 where the frame by score stays; is_open:
+ * the user has named none, so others may be tried (facts.choice.ranked).
  * What was tried goes into the stage's report, and what was seen is published (npg_fact_candidate_clouds).
  * NPG_MEMORY, NPG_STOPPED. */
-npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, npg_candidate *chosen);
+npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, bool is_open,
+                               npg_candidate *chosen);
 
 void npg_choose_pass_clear(npg_choose_pass *pass);
 

@@ -321,7 +321,8 @@ static npg_status take_back_if_worse(making *m)
     const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
     npg_mesh *before = facts->reference;
     bool is_worse = false;
-    if (!m->fused || !before || !clouds || facts->brief.growing_passes) return NPG_OK;
+    if (!m->fused || !before || !clouds || facts->brief.growing_passes || !facts->brief.takes_poses)
+        return NPG_OK;
     npg_status status = compare(&is_worse, m, clouds, before);
     if (status != NPG_DIVERGED) NPG_TRY(status);
     json_object_set_new(npg_worker_report(m->worker), "taken_back", json_boolean(is_worse));
@@ -365,12 +366,8 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
 static npg_status make_of_pass(npg_worker *worker, const npg_frame *key)
 {
     mesh_state *s = npg_worker_state(worker);
-    npg_fused *fused = npg_worker_take_fact(worker, &npg_fact_fused);
-    if (fused && !npg_worker_facts(worker)->brief.takes_gathered) {
-        npg_worker_log(worker, NPG_LOG_INFO, -1,
-                       "the keyframe's surface does not explain all frames: what others show is left out");
-        npg_fused_close(&fused);
-    }
+    npg_fused *fused =
+        npg_worker_facts(worker)->brief.takes_gathered ? npg_worker_take_fact(worker, &npg_fact_fused) : NULL;
     if (key->is_skipped || !key->point_count)
         return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)key->number);
     npg_status status = make_reference(worker, key, fused);

@@ -1,4 +1,4 @@
-/* Loop: rounds and growth. */
+/* Loop: keyframes, rounds and growth. */
 #include "reference/loop.h"
 #include "geometry/limits.h"
 
@@ -14,7 +14,9 @@
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
 {
     *loop = (npg_reference_loop){.brief = {.rounds_left = rounds,
+                                           .key = -1,
                                            .takes_gathered = true,
+                                           .takes_poses = true,
                                            .gathers_from = INT64_MIN,
                                            .gathers_to = INT64_MAX,
                                            .explained_least = EXPLAINED_FIRST}};
@@ -33,9 +35,55 @@ static void grow(npg_reference_loop *loop, int64_t unreached)
     brief->growing_passes += unreached > 0;
 }
 
+/* ---- which keyframe ---- */
+
+void npg_reference_offer(npg_reference_loop *loop, const int64_t *keys, size_t count)
+{
+    for (size_t i = 0; i < count && loop->other_count < NPG_ATTEMPTS_MOST; i++)
+        loop->others[loop->other_count++] = keys[i];
+}
+
+bool npg_reference_keeps_last(const npg_reference_loop *loop)
+{
+    return !loop->tried_count || loop->kept == loop->tried_count - 1;
+}
+
+/* Whether another keyframe is to be followed before anything is made of the pass that ended.  A side of the body
+ * fails by what it lacks, which growth adds. */
+static bool tries_another(npg_reference_loop *loop, const npg_pass_result *result)
+{
+    npg_brief *brief = &loop->brief;
+    size_t at = loop->tried_count;
+    if (loop->is_settled) return false;
+    loop->tried[loop->tried_count++] = *result;
+    if (result->bad_count < loop->tried[loop->kept].bad_count) loop->kept = at;
+    bool is_open = result->is_side || result->unreached_count;
+    if (is_open || !loop->tried[loop->kept].bad_count || at == loop->other_count) return false;
+    brief->key = loop->others[at];
+    brief->is_attempt = true;
+    brief->takes_gathered = brief->takes_poses = false;
+    return true;
+}
+
+/* What follows is decided of the best keyframe's pass, whichever was the last. */
+static const npg_pass_result *settle_key(npg_reference_loop *loop)
+{
+    const npg_pass_result *kept = &loop->tried[loop->kept];
+    loop->is_settled = true;
+    loop->brief.key = kept->key;
+    loop->brief.is_attempt = false;
+    loop->brief.takes_poses = npg_reference_keeps_last(loop);
+    return kept;
+}
+
+/* ---- what comes next ---- */
+
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result)
 {
     npg_brief *brief = &loop->brief;
+    brief->takes_poses = true;
+    if (tries_another(loop, result)) return *brief;
+    if (!loop->is_settled) result = settle_key(loop);
     /* What a side has taken from past its border was not followed yet: what other frames see through shows then. */
     bool is_whole_now =
         loop->unreached_before ? !result->unreached_count : result->is_side && !brief->is_side;
@@ -49,6 +97,7 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
     /* A side of the body never explains all. */
     brief->is_side = result->is_side;
     brief->takes_gathered = result->is_side || !result->has_changed || loop->is_limited;
+    brief->takes_poses &= brief->takes_gathered;
     if (!brief->takes_gathered && result->explained_to > result->explained_from + 1) {
         loop->is_limited = true;
         brief->gathers_from = result->explained_from;

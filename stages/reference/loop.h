@@ -1,6 +1,9 @@
 /* Loop: what is decided between two passes over all frames, of which each follows the reference so far and
  * gathers the points for the next one.
  *
+ * The first pass is a trial of the keyframe: where frames fail with it, others are tried, and the one with the
+ * fewest failures is kept, with what was gathered for it.
+ *
  * One owner decides it all: how many passes there are, whether a reference that is one side of the body grows,
  * what is asked of frames that it is to reach, and whether what was gathered makes the next reference.  The
  * stages read its brief and report what a pass came to.  No thread, no file, no run: it is a function of what
@@ -12,6 +15,8 @@
 
 /* What a pass came to. */
 typedef struct npg_pass_result {
+    int64_t key;             /* index of the keyframe whose reference was followed */
+    int64_t bad_count;       /* frames below the bar, and those that the reference does not explain */
     int64_t unreached_count; /* frames that see too much that the reference does not have, and those beyond */
     bool has_changed;        /* it does not explain the capture to both its ends ...    */
     int64_t explained_from, explained_to; /* ... but from and to the frames of these indices */
@@ -19,17 +24,32 @@ typedef struct npg_pass_result {
     bool has_images; /* frames can contradict it */
 } npg_pass_result;
 
+#define NPG_ATTEMPTS_MOST NPG_CHOICE_MAX
+
 /* {0} before npg_reference_begin().  Nothing to close. */
 typedef struct npg_reference_loop {
-    npg_brief brief;          /* the last one given */
-    int64_t unreached_before; /* of the pass before ...                             */
-    int64_t in_vain;          /* ... and passes in a row that reached no more since */
-    bool is_last_look;        /* the pass to come is walked for what it contradicts */
-    bool is_limited;          /* ... for what it explains alone                     */
+    npg_brief brief;                              /* the last one given */
+    npg_pass_result tried[NPG_ATTEMPTS_MOST + 1]; /* what each keyframe came to ...        */
+    size_t tried_count, kept;                     /* ... and which is the best so far      */
+    int64_t others[NPG_ATTEMPTS_MOST];            /* that may be tried, the best first ... */
+    size_t other_count;                           /* ... the i-th as the (i + 1)-th of all */
+    bool is_settled;                              /* the keyframe is no longer in question */
+    int64_t unreached_before;                     /* of the pass before ...                             */
+    int64_t in_vain;                              /* ... and passes in a row that reached no more since */
+    bool is_last_look;                            /* the pass to come is walked for what it contradicts */
+    bool is_limited;                              /* ... for what it explains alone                     */
 } npg_reference_loop;
 
 /* The brief of the first pass, of `rounds` that are to gather points. */
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds);
+
+/* Keyframes (count indices, the best first) that are tried, while frames fail, as long as the first pass has not
+ * ended. */
+void npg_reference_offer(npg_reference_loop *loop, const int64_t *keys, size_t count);
+
+/* Whether the keyframe of the pass that ended last is the best so far: what was gathered for it is kept, and what
+ * was for the one before is not.  To be asked after npg_reference_next(). */
+bool npg_reference_keeps_last(const npg_reference_loop *loop);
 
 /* The brief of the next one.  Parts that come, go or open belong to no common surface, and hiding them in one would
  * silence the alarm: where the reference does not explain all frames, those that it explains are followed once

@@ -84,3 +84,19 @@ bad_frames() {
     cmp whole.jsonl again-out/frames.jsonl
     tail -n 1 again.log | cmp - whole.line
 }
+
+@test "no keyframe explains two bodies: another is tried, the better one kept, and the report says so" {
+    mkdir two
+    cp bar/points/* two/
+    for n in 06 07 08 09 10 11; do awk '$1 == "v" { $3 -= 0.9 } { print }' "walker/points/frame_00$n.obj" >"two/frame_00$n.obj"; done
+    method='{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10, "attempts": 2}'
+    run_it 7 two --method "$method" --faces 800 --verbose
+    tr -d ' \n' <two-out/report.json >report
+    grep -q '"attempts":\[{"keyframe":[0-9]*,"frames_bad":[0-9]*,"kept":[a-z]*},{"keyframe":' report
+    [ "$(grep -o '"kept":true' report | wc -l)" -eq 1 ]
+    kept=$(grep -o '"keyframe":[0-9]*,"frames_bad":[0-9]*,"kept":true' report | sed 's/.*bad":\([0-9]*\),.*/\1/')
+    for bad in $(grep -o '"frames_bad":[0-9]*' report | cut -d: -f2); do [ "$kept" -le "$bad" ]; done
+    grep -q 'frames are below the bar: another is tried' two.log
+    run_it 7 two --method "$method" --faces 800 --verbose # and it is there: nothing is tried again
+    ! grep -q 'another is tried' two.log
+}

@@ -189,7 +189,7 @@ static void presets_hold_values_that_are_accepted(void **state)
     npg_options *options;
     assert_int_equal(npg_options_open(&options), NPG_OK);
     for (const npg_preset *preset = npg_presets; preset->name; preset++) {
-        assert_int_equal(npg_options_set(options, "method", preset->name), NPG_OK);
+        assert_int_equal(npg_options_set(options, preset->option, preset->name), NPG_OK);
         for (const npg_preset_value *value = preset->values; value->name; value++) {
             assert_string_equal(npg_options_get(options, value->name), value->value);
             const char *own = npg_options_get(options, value->name);
@@ -323,14 +323,15 @@ static void a_method_is_a_name_a_text_or_a_file(void **state)
 {
     (void)state;
     const char *path = in_folder(&folder, "method.json");
-    assert_int_equal(write_text_file(path, "{ // mine\n\"preset\": \"best\", \"epochs\": 7}"), 0);
+    assert_int_equal(write_text_file(path, "{ // mine\n\"preset\": \"grids\", \"epochs\": 7}"), 0);
     npg_options *options = open_all();
     char usual[32];
     snprintf(usual, sizeof usual, "%s", npg_options_get(options, "reference-rounds"));
-    assert_int_equal(npg_options_set(options, "method", "best"), NPG_OK);
+    assert_int_equal(npg_options_set(options, "effort", "best"), NPG_OK);
     assert_string_not_equal(npg_options_get(options, "reference-rounds"), usual);
-    assert_int_equal(npg_options_set(options, "method", "paper"), NPG_OK);
+    assert_int_equal(npg_options_set(options, "effort", "usual"), NPG_OK);
     assert_string_equal(npg_options_get(options, "reference-rounds"), usual);
+    assert_int_equal(npg_options_set(options, "method", "paper"), NPG_OK);
     assert_string_equal(npg_options_get(options, "align"), "no");
     assert_string_equal(npg_options_get(options, "preset"), "paper");
     assert_int_equal(npg_options_set(options, "method", " {\"epochs\": 5, \"faces\": 300}"), NPG_OK);
@@ -338,7 +339,7 @@ static void a_method_is_a_name_a_text_or_a_file(void **state)
     assert_string_equal(npg_options_get(options, "epochs"), "5");
     assert_string_equal(npg_options_get(options, "faces"), "300");
     assert_int_equal(npg_options_set(options, "method", path), NPG_OK);
-    assert_string_equal(npg_options_get(options, "method"), "best");
+    assert_string_equal(npg_options_get(options, "method"), "grids");
     assert_string_equal(npg_options_get(options, "epochs"), "7");
     npg_options_close(&options);
 }
@@ -352,7 +353,8 @@ static void a_bad_method_is_named(void **state)
                                   {"{\n\"epochs\": -1}", "method: option epochs"},
                                   {"{\"preset\": \"other.json\"}", "other.json"},
                                   {"{\"method\": {\"epochs\": 1}}", "method"},
-                                  {"{\"quality\": \"best\"}", "--method best"},
+                                  {"{\"quality\": \"best\"}", "--effort best"},
+                                  {"best", "--effort best"},
                                   {"{\"grid\": {\"n_level\": 99}}", "method_json.py"},
                                   {"[1]", "method"}};
     (void)state;

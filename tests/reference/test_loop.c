@@ -157,6 +157,68 @@ static void growth_never_goes_on_for_ever(void **state)
     assert_in_range(passes, 10, 100);
 }
 
+/* A pass with the keyframe `key` in which so many frames failed. */
+static npg_brief next_of(npg_reference_loop *loop, int64_t key, int64_t bad)
+{
+    const npg_pass_result result = {.key = key, .bad_count = bad, .explained_to = 20};
+    return npg_reference_next(loop, &result);
+}
+
+static const int64_t others[] = {3, 7};
+
+static void a_keyframe_that_fails_gives_way_to_a_better_one(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 1);
+    npg_reference_offer(&loop, others, 2);
+    npg_brief brief = next_of(&loop, 5, 9);
+    assert_true(brief.is_attempt && brief.rounds_left == 1);
+    assert_int_equal(brief.key, 3);
+    assert_false(brief.takes_gathered || brief.takes_poses);
+    brief = next_of(&loop, 3, 0); /* all is well: the other one is not tried */
+    assert_int_equal(brief.key, 3);
+    assert_false(brief.is_attempt);
+    assert_true(brief.takes_gathered && brief.takes_poses && npg_reference_keeps_last(&loop));
+    assert_int_equal(brief.rounds_left, 0);
+}
+
+static void a_keyframe_that_does_no_better_is_taken_back(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 2);
+    npg_reference_offer(&loop, others, 2);
+    next_of(&loop, 5, 4);
+    npg_brief brief = next_of(&loop, 3, 9);
+    assert_int_equal(brief.key, 7);
+    assert_false(npg_reference_keeps_last(&loop));
+    brief = next_of(&loop, 7, 4); /* no better is not enough */
+    assert_int_equal(brief.key, 5);
+    assert_false(brief.is_attempt || brief.takes_poses || npg_reference_keeps_last(&loop));
+    assert_true(brief.takes_gathered);
+    assert_int_equal(brief.rounds_left, 1); /* as without any attempt */
+    brief = next_of(&loop, 5, 4);           /* and it is not in question again */
+    assert_int_equal(brief.key, 5);
+    assert_true(brief.takes_gathered && brief.takes_poses);
+    assert_int_equal(brief.rounds_left, 0);
+}
+
+static void no_other_keyframe_is_tried_without_need(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 1);
+    npg_reference_offer(&loop, others, 2);
+    assert_false(next_of(&loop, 5, 0).is_attempt);
+    npg_reference_begin(&loop, 1); /* nor of a side, which fails by what it lacks */
+    npg_reference_offer(&loop, others, 2);
+    const npg_pass_result side = {.key = 5, .bad_count = 9, .is_side = true};
+    assert_false(npg_reference_next(&loop, &side).is_attempt);
+    npg_reference_begin(&loop, 1); /* nor where there is none */
+    assert_false(next_of(&loop, 5, 9).is_attempt);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -169,6 +231,9 @@ int main(void)
         cmocka_unit_test(a_whole_body_is_not_trimmed),
         cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),
         cmocka_unit_test(growth_never_goes_on_for_ever),
+        cmocka_unit_test(a_keyframe_that_fails_gives_way_to_a_better_one),
+        cmocka_unit_test(a_keyframe_that_does_no_better_is_taken_back),
+        cmocka_unit_test(no_other_keyframe_is_tried_without_need),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -21,6 +21,6 @@ static const npg_stage fuzz_stage = {.name = "fuzz", .options = fuzz_options};
 const npg_stage *const npg_chain[] = {&fuzz_stage, NULL};
 
 static const npg_preset_value fuzz_paper[] = {{"whole", "7"}, {0}};
-const npg_preset npg_presets[] = {{"paper", "", fuzz_paper}, {0}};
+const npg_preset npg_presets[] = {{"method", "paper", "", fuzz_paper}, {0}};
 
 #endif

@@ -154,7 +154,7 @@ EOF
 @test "an option that went or moved says where to" {
     run "$NEUPIG" run in -o out --quality best
     [ "$status" -eq 2 ]
-    [[ "$output" == *"went: --method best"* ]]
+    [[ "$output" == *"went: --effort best"* ]]
     run "$NEUPIG" run in -o out --epochs 5
     [ "$status" -eq 2 ]
     [[ "$output" == *"option --epochs is a key of the method now: --method '{\"epochs\": 5}'"* ]]
@@ -183,7 +183,7 @@ EOF
 
 @test "help method lists names and keys, which are no options of run" {
     "$NEUPIG" help method >method
-    for name in default best paper paper-1000 grids epochs align poisson-depth; do grep -q "^  $name " method; done
+    for name in default paper paper-1000 grids epochs align poisson-depth; do grep -q "^  $name " method; done
     "$NEUPIG" help run --help-all >run
     run grep -E '^  --(no-)?(epochs|align|ring|preset) ' run
     [ "$status" -eq 1 ]
