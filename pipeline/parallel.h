@@ -6,7 +6,7 @@
 
 #include "pipeline/status.h"
 
-#define NPG_PARALLEL_MAX 64 /* parts; their state is on the stack of the caller */
+#define NPG_PARALLEL_MAX 64 /* parts that are worth it, whatever the machine */
 
 /* Code that gcc builds for several widths of x86 processor; which one runs is settled when the program is
  * loaded (the sanitizers' start-up code can't do that).  For small loops over plain arrays. */
@@ -19,11 +19,12 @@
 /* What one part does; parts may not touch what another writes. */
 typedef npg_status (*npg_part)(void *user, size_t part);
 
-/* Call part(user, 0) .. part(user, count - 1), count <= NPG_PARALLEL_MAX, each in a thread of its own but the
- * first, and return when all are done: NPG_OK, or the status of the lowest part that did not return it, with
- * its error text.  A part whose thread can't be started is done by the caller: only the time suffers.  What
- * comes out must not depend on how many threads there are: split by what the work is, or let no part's result
- * depend on the split. */
+/* Call part(user, 0) .. part(user, count - 1), and return when all are done: NPG_OK, or the status of the lowest
+ * part that did not return it, with its error text.  Parts are taken in their order by the caller and by the
+ * threads of one pool, of which there are as many as the process has cores beside the caller's; it starts with
+ * the first call.  None waits for another, and any may call this itself: a caller does what no thread takes.
+ * Any thread.  What comes out must not depend on how many threads there are: split by what the work is, or
+ * let no part's result depend on the split. */
 npg_status npg_parallel(npg_part part, void *user, size_t count);
 
 /* Parts that are worth their threads: one per core, each of at least `least` of `count` items, no more than

@@ -13,21 +13,22 @@
 
 #define LANES 8           /* of a column */
 #define CELL  (6 * LANES) /* floats of a block */
-
-/* What one thread gathers. */
-typedef struct part {
-    double *diagonal; /* n x 36 */
-    double *off;      /* pair_count x 36, block (a, b) */
-    double *right;    /* n x 6 */
-} part;
+#define GRAIN 64          /* nodes whose rows are gathered, or multiplied, at a time */
 
 struct npg_block_system {
     npg_arena arena; /* of all arrays */
     size_t n, pair_count;
     uint32_t (*pairs)[2]; /* sorted                               */
     uint32_t *first;      /* n + 1: pairs[first[a]] .. have a = a */
-    part parts[NPG_BLOCK_PARTS];
+    size_t term_most;
+    double *sum;          /* n x 36: blocks on the diagonal */
+    double *off;          /* pair_count x 36, block (a, b)  */
+    double *right;        /* n x 6                          */
+    uint32_t *term_first; /* n + 2: uses[term_first[a]] .. are node a's */
+    uint32_t *uses;       /* NPG_BLOCK_NODES a term: its number times NPG_BLOCK_NODES + which of its nodes */
+    const npg_block_term *terms; /* that are gathered; a loan */
     /* of the solution */
+    double damping;
     uint32_t *row_first;       /* n + 1: entries[row_first[a]] .. are row a's, without the diagonal */
     uint32_t *other;           /* per entry: the column's node                                      */
     uint32_t *place;           /* per pair: its two entries                                         */
@@ -45,11 +46,11 @@ static npg_status open_arrays(npg_block_system *s)
 {
     npg_arena *arena = &s->arena;
     size_t n = s->n, pairs = s->pair_count;
-    for (size_t i = 0; i < NPG_BLOCK_PARTS; i++) {
-        s->parts[i].diagonal = npg_arena_take(arena, n, 36 * sizeof(double));
-        s->parts[i].off = npg_arena_take(arena, pairs, 36 * sizeof(double));
-        s->parts[i].right = npg_arena_take(arena, n, 6 * sizeof(double));
-    }
+    s->sum = npg_arena_take(arena, n, 36 * sizeof(double));
+    s->off = npg_arena_take(arena, pairs, 36 * sizeof(double));
+    s->right = npg_arena_take(arena, n, 6 * sizeof(double));
+    s->term_first = npg_arena_take(arena, n + 2, sizeof *s->term_first);
+    s->uses = npg_arena_take(arena, s->term_most, NPG_BLOCK_NODES * sizeof *s->uses);
     s->pairs = npg_arena_take(arena, pairs, sizeof *s->pairs);
     s->first = npg_arena_take(arena, n + 2, sizeof *s->first);
     s->row_first = npg_arena_take(arena, n + 2, sizeof *s->row_first);
@@ -85,13 +86,15 @@ static void fill_rows(npg_block_system *s, const uint32_t (*pairs)[2])
     lay_out_rows(s);
 }
 
-npg_status npg_block_open(npg_block_system **out, size_t n, const uint32_t (*pairs)[2], size_t pair_count)
+npg_status npg_block_open(npg_block_system **out, size_t n, const uint32_t (*pairs)[2], size_t pair_count,
+                          size_t term_most)
 {
     *out = NULL;
     NPG_TRY(npg_object_open(out, NPG_FOR_FIT, sizeof **out));
     npg_block_system *s = *out;
     s->n = n;
     s->pair_count = pair_count;
+    s->term_most = term_most;
     npg_status status = open_arrays(s);
     if (!status) fill_rows(s, pairs);
     if (status) npg_block_close(out);
@@ -100,105 +103,125 @@ npg_status npg_block_open(npg_block_system **out, size_t n, const uint32_t (*pai
 
 /* ---- gathering ---- */
 
-void npg_block_clear(npg_block_system *s, size_t which)
+/* Inlined into what is built for several widths of processor. */
+#define INSIDE static inline __attribute__((always_inline))
+
+/* Which terms each node has, in their order. */
+static void list_uses(npg_block_system *s, const npg_block_term *terms, size_t count)
 {
-    part *p = &s->parts[which];
-    memset(p->diagonal, 0, s->n * 36 * sizeof(double));
-    memset(p->off, 0, s->pair_count * 36 * sizeof(double));
-    memset(p->right, 0, s->n * 6 * sizeof(double));
+    uint32_t *end = s->term_first + 1; /* node a's end while it is filled, its begin being term_first[a] */
+    memset(s->term_first, 0, (s->n + 2) * sizeof *s->term_first);
+    for (size_t t = 0; t < count; t++)
+        for (size_t k = 0; k < terms[t].count; k++) end[terms[t].nodes[k] + 1]++;
+    for (size_t a = 0; a < s->n; a++) end[a + 1] += end[a];
+    for (size_t t = 0; t < count; t++)
+        for (size_t k = 0; k < terms[t].count; k++)
+            s->uses[end[terms[t].nodes[k]]++] = (uint32_t)(t * NPG_BLOCK_NODES + k);
 }
 
 /* The number of the pair (a, b), a < b; pair_count when it is not in the set.  Of the dozen that have this a
  * all are counted: a branch that goes either way costs more. */
-static size_t pair_of(const npg_block_system *s, uint32_t a, uint32_t b)
+INSIDE size_t pair_of(const npg_block_system *s, uint32_t a, uint32_t b)
 {
     uint32_t at = s->first[a], end = s->first[a + 1];
     for (uint32_t e = s->first[a]; e < end; e++) at += s->pairs[e][1] < b;
     return at < end && s->pairs[at][1] == b ? at : s->pair_count;
 }
 
-/* A coupling of two of a term's nodes. */
-typedef struct coupling {
-    double *block, share;
-    size_t a, b;
-} coupling;
-
 typedef double four __attribute__((vector_size(4 * sizeof(double)), aligned(sizeof(double))));
 
-/* Each block += scale share u_a u_b^T; two of its rows are three vectors. */
-NPG_WIDE static void add_outers(coupling *list, size_t count, double scale, double (*u)[6])
+/* block += sum_c u_c v_c^T over `count` pairs; two of its rows are three vectors, and all nine stay in registers:
+ * what was just stored by numbers would be slow to load as vectors. */
+INSIDE void add_outers(double *block, double (*u)[6], double (*v)[6], int count)
 {
-    for (size_t n = 0; n < count; n++) {
-        const double *v = u[list[n].b], factor = scale * list[n].share;
-        const four begin = {v[0], v[1], v[2], v[3]}, middle = {v[4], v[5], v[0], v[1]},
-                   end = {v[2], v[3], v[4], v[5]};
-        for (int i = 0; i < 6; i += 2) {
-            double x = factor * u[list[n].a][i], y = factor * u[list[n].a][i + 1];
-            four *rows = (four *)(list[n].block + 6 * i);
-            rows[0] += (four){x, x, x, x} * begin;
-            rows[1] += (four){x, x, y, y} * middle;
-            rows[2] += (four){y, y, y, y} * end;
+    four *to = (four *)block, rows[9];
+    for (int i = 0; i < 9; i++) rows[i] = to[i];
+    for (int c = 0; c < count; c++) {
+        const double *x = u[c], *y = v[c];
+        const four begin = {y[0], y[1], y[2], y[3]}, middle = {y[4], y[5], y[0], y[1]},
+                   end = {y[2], y[3], y[4], y[5]};
+        for (int i = 0; i < 3; i++) {
+            double p = x[2 * i], q = x[2 * i + 1];
+            rows[3 * i] += (four){p, p, p, p} * begin;
+            rows[3 * i + 1] += (four){p, p, q, q} * middle;
+            rows[3 * i + 2] += (four){q, q, q, q} * end;
         }
     }
+    for (int i = 0; i < 9; i++) to[i] = rows[i];
 }
 
-/* block += scale K(a)^T K(b), K(y) = (-[y]x, I): a turn moves by turn x arm.  In blocks of 3 x 3:
- *
- *     a.b I - b a^T    [a]x
- *     -[b]x            I
- */
-static void add_arms(double *block, double scale, const double a[3], const double b[3])
+/* K^T of the three axes, K(arm) = (-[arm]x, I): a turn moves by turn x arm; and of the normal; each times what it
+ * counts.  How many of them do count. */
+INSIDE int set_levers(double (*lever)[6], const npg_block_term *t, size_t k, double across, double along)
 {
-    double along = npg_vec3_dot(a, b);
-    for (int i = 0; i < 3; i++) {
-        int j = (i + 1) % 3, k = (i + 2) % 3;
-        for (int c = 0; c < 3; c++) block[6 * i + c] -= scale * b[i] * a[c];
-        block[6 * i + i] += scale * along;
-        block[6 * i + 3 + j] -= scale * a[k];
-        block[6 * i + 3 + k] += scale * a[j];
-        block[6 * (3 + i) + j] += scale * b[k];
-        block[6 * (3 + i) + k] -= scale * b[j];
-        block[6 * (3 + i) + 3 + i] += scale;
-    }
+    const double *a = t->arms[k], *n = t->normal;
+    const double all[4][6] = {{0, along * a[2], -along * a[1], along, 0, 0},
+                              {-along * a[2], 0, along * a[0], 0, along, 0},
+                              {along * a[1], -along * a[0], 0, 0, 0, along},
+                              {across * (a[1] * n[2] - a[2] * n[1]), across * (a[2] * n[0] - a[0] * n[2]),
+                               across * (a[0] * n[1] - a[1] * n[0]), across * n[0], across * n[1],
+                               across * n[2]}};
+    memcpy(lever, all, sizeof all);
+    return t->across != 0 ? 4 : 3;
 }
 
-/* Of each block once; pairs that are not in the set are left out. */
-static size_t list_couplings(coupling *list, const npg_block_system *s, const part *p,
-                             const npg_block_term *t)
+/* What a term says of its node k: its right side, and its blocks with itself and nodes behind it; couplings of
+ * pairs that are not in the set are left out. */
+INSIDE void add_use(npg_block_system *s, const npg_block_term *t, size_t k)
 {
-    size_t count = 0;
-    for (size_t a = 0; a < t->count; a++)
-        for (size_t b = 0; b < t->count; b++) {
-            if (t->nodes[a] > t->nodes[b]) continue;
-            size_t pair = a == b ? 0 : pair_of(s, t->nodes[a], t->nodes[b]);
-            if (pair == s->pair_count && a != b) continue;
-            double *block = a == b ? p->diagonal + 36 * (size_t)t->nodes[a] : p->off + 36 * pair;
-            list[count++] = (coupling){block, t->shares[a] * t->shares[b], a, b};
-        }
-    return count;
-}
-
-void npg_block_add(npg_block_system *s, size_t which, const npg_block_term *t)
-{
-    part *p = &s->parts[which];
-    double lever[NPG_BLOCK_NODES][6], pull[3], level = 0;
-    for (int c = 0; c < 3; c++) level += t->normal[c] * t->right[c];
+    uint32_t a = t->nodes[k];
+    double lever[4][6], other[4][6], pull[3], turned[3], *right = s->right + 6 * (size_t)a;
+    double level = npg_vec3_dot(t->normal, t->right);
     for (int c = 0; c < 3; c++) pull[c] = t->across * level * t->normal[c] + t->along * t->right[c];
-    for (size_t k = 0; k < t->count; k++) {
-        double turned[3], *right = p->right + 6 * (size_t)t->nodes[k];
-        npg_vec3_cross(turned, t->arms[k], pull);
-        npg_vec3_cross(lever[k], t->arms[k], t->normal);
-        memcpy(lever[k] + 3, t->normal, sizeof t->normal);
-        for (int c = 0; c < 3; c++) {
-            right[c] += t->shares[k] * turned[c];
-            right[3 + c] += t->shares[k] * pull[c];
-        }
+    npg_vec3_cross(turned, t->arms[k], pull);
+    for (int c = 0; c < 3; c++) {
+        right[c] += t->shares[k] * turned[c];
+        right[3 + c] += t->shares[k] * pull[c];
     }
-    coupling list[NPG_BLOCK_NODES * NPG_BLOCK_NODES];
-    size_t count = list_couplings(list, s, p, t);
-    if (t->across != 0) add_outers(list, count, t->across, lever);
-    for (size_t n = 0; n < count && t->along != 0; n++)
-        add_arms(list[n].block, t->along * list[n].share, t->arms[list[n].a], t->arms[list[n].b]);
+    int count = set_levers(lever, t, k, t->across * t->shares[k], t->along * t->shares[k]);
+    for (size_t b = 0; b < t->count; b++) {
+        if (t->nodes[b] < a) continue;
+        size_t pair = b == k ? 0 : pair_of(s, a, t->nodes[b]);
+        if (pair == s->pair_count && b != k) continue;
+        set_levers(other, t, b, t->shares[b], t->shares[b]);
+        add_outers(b == k ? s->sum + 36 * (size_t)a : s->off + 36 * pair, lever, other, count);
+    }
+}
+
+/* Rows [first, last). */
+NPG_WIDE static void gather_rows(npg_block_system *s, size_t first, size_t last)
+{
+    size_t pairs = s->first[last] - s->first[first];
+    memset(s->sum + 36 * first, 0, (last - first) * 36 * sizeof(double));
+    memset(s->off + 36 * (size_t)s->first[first], 0, pairs * 36 * sizeof(double));
+    memset(s->right + 6 * first, 0, (last - first) * 6 * sizeof(double));
+    for (uint32_t u = s->term_first[first]; u < s->term_first[last]; u++)
+        add_use(s, &s->terms[s->uses[u] / NPG_BLOCK_NODES], s->uses[u] % NPG_BLOCK_NODES);
+}
+
+static size_t grains(const npg_block_system *s)
+{
+    return (s->n + GRAIN - 1) / GRAIN;
+}
+
+static size_t grain_end(const npg_block_system *s, size_t part)
+{
+    return (part + 1) * GRAIN < s->n ? (part + 1) * GRAIN : s->n;
+}
+
+static npg_status gather_part(void *user, size_t part)
+{
+    npg_block_system *s = user;
+    gather_rows(s, part * GRAIN, grain_end(s, part));
+    return NPG_OK;
+}
+
+npg_status npg_block_gather(npg_block_system *s, const npg_block_term *terms, size_t count)
+{
+    NPG_REQUIRE(count <= s->term_most);
+    list_uses(s, terms, count);
+    s->terms = terms;
+    return npg_parallel(gather_part, s, grains(s));
 }
 
 /* ---- solving ---- */
@@ -221,28 +244,23 @@ static void invert(double *inverse, const double *a)
     }
 }
 
-/* The sum of the parts' blocks at the same place. */
-static void add_parts(double sum[36], const double *a, const double *b)
+static npg_status lay_out_part(void *user, size_t part)
 {
-    for (int i = 0; i < 36; i++) sum[i] = a[i] + b[i];
-}
-
-static void lay_out(npg_block_system *s, double damping)
-{
-    const part *p = s->parts;
+    const npg_block_system *s = user;
     double sum[36], inverse[36];
-    for (size_t k = 0; k < s->n; k++) {
-        add_parts(sum, p[0].diagonal + 36 * k, p[1].diagonal + 36 * k);
-        for (int i = 0; i < 6; i++) sum[7 * i] += damping;
+    size_t first = part * GRAIN, last = grain_end(s, part);
+    for (size_t k = first; k < last; k++) {
+        memcpy(sum, s->sum + 36 * k, sizeof sum);
+        for (int i = 0; i < 6; i++) sum[7 * i] += s->damping;
         invert(inverse, sum);
         set_cell(s->diagonal + CELL * k, sum, false);
         set_cell(s->inverse + CELL * k, inverse, false);
     }
-    for (size_t e = 0; e < s->pair_count; e++) {
-        add_parts(sum, p[0].off + 36 * e, p[1].off + 36 * e);
-        set_cell(s->cells + CELL * (size_t)s->place[2 * e], sum, false);
-        set_cell(s->cells + CELL * (size_t)s->place[2 * e + 1], sum, true);
+    for (size_t e = s->first[first]; e < s->first[last]; e++) {
+        set_cell(s->cells + CELL * (size_t)s->place[2 * e], s->off + 36 * e, false);
+        set_cell(s->cells + CELL * (size_t)s->place[2 * e + 1], s->off + 36 * e, true);
     }
+    return NPG_OK;
 }
 
 typedef float lanes __attribute__((vector_size(LANES * sizeof(float))));
@@ -257,16 +275,30 @@ static inline void add_cell(lanes sum[2], const float *cell, const float *x)
     }
 }
 
-/* y = the whole matrix x. */
-NPG_WIDE static void multiply(const npg_block_system *s, float *restrict y, const float *restrict x)
+/* Rows [first, last) of y = the whole matrix x. */
+NPG_WIDE static void multiply_rows(const npg_block_system *s, float *restrict y, const float *restrict x,
+                                   size_t first, size_t last)
 {
-    for (size_t a = 0; a < s->n; a++) {
+    for (size_t a = first; a < last; a++) {
         lanes sum[2] = {{0}, {0}};
         add_cell(sum, s->diagonal + CELL * a, x + LANES * a);
         for (uint32_t e = s->row_first[a]; e < s->row_first[a + 1]; e++)
             add_cell(sum, s->cells + CELL * (size_t)e, x + LANES * (size_t)s->other[e]);
         *(lanes *)(y + LANES * a) = sum[0] + sum[1];
     }
+}
+
+typedef struct product {
+    const npg_block_system *system;
+    float *y;
+    const float *x;
+} product;
+
+static npg_status multiply_part(void *user, size_t part)
+{
+    const product *p = user;
+    multiply_rows(p->system, p->y, p->x, part * GRAIN, grain_end(p->system, part));
+    return NPG_OK;
 }
 
 /* z = the inverted diagonal r. */
@@ -292,17 +324,16 @@ static double dot(const float *a, const float *b, size_t n)
 
 static void set_right(const npg_block_system *s, float *r)
 {
-    const part *p = s->parts;
     for (size_t k = 0; k < s->n; k++)
-        for (size_t i = 0; i < 6; i++)
-            r[LANES * k + i] = (float)(p[0].right[6 * k + i] + p[1].right[6 * k + i]);
+        for (size_t i = 0; i < 6; i++) r[LANES * k + i] = (float)s->right[6 * k + i];
 }
 
 int npg_block_solve(npg_block_system *s, double *out, double damping, double tolerance, int iterations)
 {
     size_t n = LANES * s->n;
     float *x = s->work, *r = x + n, *z = r + n, *p = z + n, *q = p + n;
-    lay_out(s, damping);
+    s->damping = damping;
+    npg_parallel(lay_out_part, s, grains(s));
     memset(s->work, 0, 5 * n * sizeof *x);
     set_right(s, r);
     double stop = tolerance * tolerance * dot(r, r, n);
@@ -311,7 +342,7 @@ int npg_block_solve(npg_block_system *s, double *out, double damping, double tol
     double rz = dot(r, z, n);
     int step = 0;
     for (; step < iterations && dot(r, r, n) > stop; step++) {
-        multiply(s, q, p);
+        npg_parallel(multiply_part, &(product){s, q, p}, grains(s));
         double curvature = dot(p, q, n);
         if (!(curvature > 0)) break; /* nothing more to gain in single precision */
         float alpha = (float)(rz / curvature);

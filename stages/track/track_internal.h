@@ -11,11 +11,10 @@
 /* Block system: the normal equations of a graph's nodes, 6 unknowns each (a turn and a move), and their
  * solution by conjugate gradients.
  *
- * Symmetric and positive; one 6 x 6 block per node and per pair of nodes of a fixed set.  Terms are gathered
- * in parts, so that threads can add at the same time; the solution adds the parts up in their order. */
+ * Symmetric and positive; one 6 x 6 block per node and per pair of nodes of a fixed set.  Rows are gathered by
+ * as many threads as there are, each node's by one, from its terms in their order. */
 
 #define NPG_BLOCK_NODES 4 /* of a term, at most */
-#define NPG_BLOCK_PARTS 2
 
 typedef struct npg_block_system npg_block_system;
 
@@ -28,16 +27,14 @@ typedef struct npg_block_term {
     double right[3];
 } npg_block_term;
 
-/* n nodes; pairs (a < b, sorted) that may be coupled, beside each node with itself. */
+/* n nodes; pairs (a < b, sorted) that may be coupled, beside each node with itself; so many terms at most. */
 npg_status npg_block_open(npg_block_system **system, size_t node_count, const uint32_t (*pairs)[2],
-                          size_t pair_count);
+                          size_t pair_count, size_t term_most);
 void npg_block_close(npg_block_system **system);
 
-/* A part becomes zero. */
-void npg_block_clear(npg_block_system *system, size_t part);
-
-/* Add a term to a part; one thread a part.  Couplings of pairs that are not in the set are left out. */
-void npg_block_add(npg_block_system *system, size_t part, const npg_block_term *term);
+/* The equations become the sum of these terms (N; of count 0: none).  Couplings of pairs that are not in the set
+ * are left out.  Equal terms give equal bits, however many threads there are. */
+npg_status npg_block_gather(npg_block_system *system, const npg_block_term *terms, size_t count);
 
 /* x (n x 6: turn, move) so that the residual is at most `tolerance` (>= 1e-6: it works in single precision)
  * of the right side, or after `iterations`.  `damping` times the identity is added first.  Returns the

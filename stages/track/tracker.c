@@ -23,12 +23,7 @@
 #define SETTLED     0.01 /* of the graph's radius: a step that moves no node farther ends the fit */
 #define PAIR_WIDTHS 3.0  /* samples farther than so many widths from every point have no pair: a hole */
 #define ONE_SIDE    20   /* times the stiffness where one sensor leaves half of the body to the edges */
-/* Shares of the targets that the thread for surface -> points takes over, so that both end together. */
-#define LENT_PAIRS 0.35
-#define LENT_TERMS 0.18
-
-/* What each thread gathers: points -> surface; surface -> points and the edges. */
-enum { TO_SURFACE, TO_POINTS };
+#define GRAIN       512  /* targets, samples or edges at a time: a thread's next piece of work */
 
 struct npg_tracker {
     npg_arena arena; /* of all arrays that are not said to be loans */
@@ -38,7 +33,7 @@ struct npg_tracker {
     npg_proxy *thin;      /* the surface that is aligned: W vertices of it, which the graph carries */
     const npg_mesh *mesh; /* the thin one's */
     npg_graph *graph;
-    npg_block_system *system; /* its parts: TO_SURFACE, TO_POINTS */
+    npg_block_system *system;
     npg_surface *surface;
     float *vert_pos, *vert_normals; /* W x 3: the pose at work */
     uint32_t *samples;              /* vertices, spread over the surface */
@@ -60,6 +55,11 @@ struct npg_tracker {
     uint8_t *is_empty; /* samples: where a sensor saw that nothing is */
     npg_visible visible;
     npg_occlusion_prior prior; /* edges of what no sensor sees */
+    npg_block_term *terms;     /* of the targets, the samples, and the edges, both ways, of a step */
+    struct sums {
+        double dist, dist_sq;
+        size_t compared, explained; /* that can be of the surface at all; that it has a place for */
+    } * sums;                       /* of each grain of targets */
 };
 
 size_t npg_tracker_node_count(const npg_tracker *tracker)
@@ -145,8 +145,12 @@ static npg_status open_arrays(npg_tracker *t)
 static npg_status open_system(npg_tracker *t)
 {
     NPG_TRY(npg_prior_open(&t->prior, &t->arena, t->graph));
+    size_t terms = t->settings.samples + t->sample_count + 2 * t->prior.pair_count;
+    t->terms = npg_arena_take(&t->arena, terms, sizeof *t->terms);
+    t->sums = npg_arena_take(&t->arena, t->settings.samples / GRAIN + 1, sizeof *t->sums);
+    NPG_TRY(npg_arena_status(&t->arena));
     return npg_block_open(&t->system, t->graph->node_count, (const uint32_t(*)[2])t->prior.pairs,
-                          t->prior.pair_count);
+                          t->prior.pair_count, terms);
 }
 
 static double size_of(const npg_mesh *reference)
@@ -229,9 +233,9 @@ static void set_arm(double arm[3], const double *rotation, const float *point, c
     turn_arm(arm, rotation, d);
 }
 
-/* Add weight * rho'(|d|^2) |x - target|_W^2 to the equations. */
-static void add_pull(const npg_tracker *t, size_t part, const pull *p, const double *pose, double weight,
-                     double width)
+/* The term weight * rho'(|d|^2) |x - target|_W^2. */
+static void set_pull(npg_block_term *out, const npg_tracker *t, const pull *p, const double *pose,
+                     double weight, double width)
 {
     npg_block_term term = {0};
     double x[3], dist_sq = 0;
@@ -251,7 +255,7 @@ static void add_pull(const npg_tracker *t, size_t part, const pull *p, const dou
     memcpy(term.normal, p->normal, sizeof term.normal);
     term.across = weight * (1 - t->along);
     term.along = weight * t->along;
-    npg_block_add(t->system, part, &term);
+    *out = term;
 }
 
 /* ---- the terms of a step ---- */
@@ -278,92 +282,93 @@ static bool could_be_seen(const npg_tracker *t, const npg_tracker_cloud *cloud, 
            npg_faces_sensor(cloud->sensors, cloud->sensor_count, point, normal, NPG_AGAINST);
 }
 
-/* Points -> surface, targets [first, last).  tracked: their share of the mean distance and of the mean of
- * squares; *compared_count: those of them that can be of the surface at all. */
-static void add_targets(npg_tracker *t, size_t part, npg_tracked *tracked, size_t *compared_count,
-                        size_t first, size_t last, const double *pose, const npg_tracker_cloud *cloud,
-                        bool with_normals, double width)
+/* What all of a step's threads read. */
+typedef struct step {
+    npg_tracker *t;
+    const double *pose;
+    const npg_kdtree *tree;
+    const npg_tracker_cloud *cloud;
+    const float *normals; /* of the points, or NULL where they have no say */
+    double width, stiffness;
+    bool is_first, is_settling;
+} step;
+
+/* Points -> surface, targets [first, last), all of one grain. */
+static void set_targets(const step *s, size_t first, size_t last)
 {
-    size_t compared = 0, explained = 0;
-    double sum = 0, squares = 0, share = 1 / (double)t->target_count;
+    const npg_tracker *t = s->t;
+    struct sums sums = {0};
     for (size_t i = first; i < last; i++) {
         const npg_surface_hit *hit = &t->hits[i];
+        npg_block_term *term = &t->terms[i];
         pull p;
+        term->count = 0;
         hit_normal(p.normal, t, hit);
-        if (cloud->sensor_count && !could_be_seen(t, cloud, hit, t->targets + 3 * i, p.normal)) continue;
-        compared++;
-        sum += sqrt((double)hit->dist_sq);
-        squares += (double)hit->dist_sq;
+        if (s->cloud->sensor_count && !could_be_seen(t, s->cloud, hit, t->targets + 3 * i, p.normal))
+            continue;
+        sums.compared++;
+        sums.dist += sqrt((double)hit->dist_sq);
+        sums.dist_sq += (double)hit->dist_sq;
         double facing = 0;
-        for (size_t c = 0; c < 3 && with_normals; c++)
+        for (size_t c = 0; c < 3 && s->normals; c++)
             facing += p.normal[c] * (double)t->target_normals[3 * i + c];
         if (facing < NPG_AGAINST) continue;
-        explained += (double)hit->dist_sq <= PAIR_WIDTHS * PAIR_WIDTHS * width * width;
+        sums.explained += (double)hit->dist_sq <= PAIR_WIDTHS * PAIR_WIDTHS * s->width * s->width;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
-        add_pull(t, part, &p, pose, share, width);
+        set_pull(term, t, &p, s->pose, 1 / (double)t->target_count, s->width);
     }
-    tracked->point_dist_mean = sum * share;
-    tracked->point_dist_sq = squares * share;
-    tracked->explained = (double)explained * share;
-    *compared_count = compared;
+    if (first < last) t->sums[first / GRAIN] = sums;
 }
 
 /* Surface where nothing is goes towards the nearest point, seen or not, however far that is. */
-static void add_stray(npg_tracker *t, const double *pose, pull *p, const float *place, double weight,
-                      double width)
+static void set_stray(npg_block_term *term, const step *s, pull *p, const float *place, double weight)
 {
     double way[3];
     for (size_t c = 0; c < 3; c++) p->normal[c] = way[c] = p->target[c] - (double)place[c];
     if (!npg_vec3_make_unit(p->normal)) return;
-    add_pull(t, TO_POINTS, p, pose, weight, fmax(width, npg_vec3_length(way)));
+    set_pull(term, s->t, p, s->pose, weight, fmax(s->width, npg_vec3_length(way)));
 }
 
-/* Surface -> points, for samples whose nearest point is close enough to be theirs. */
-static void add_samples(npg_tracker *t, const double *pose, const float *points, const float *normals,
-                        double width)
+/* Surface -> points, for sample i, if its nearest point is close enough to be its. */
+static void set_sample(npg_block_term *term, const step *s, size_t i)
 {
-    double share = REVERSE / (double)t->sample_count;
-    for (size_t s = 0; s < t->sample_count; s++) {
-        if (!t->is_seen[s] && !t->is_empty[s]) continue;
-        size_t v = t->samples[s];
-        pull p;
-        double facing = 0;
-        for (size_t c = 0; c < 3; c++) {
-            p.rest[c] = t->mesh->vert_pos[3 * v + c];
-            p.normal[c] = (double)t->vert_normals[3 * v + c];
-            p.target[c] = (double)points[3 * (size_t)t->near[s] + c];
-            if (normals) facing += p.normal[c] * (double)normals[3 * (size_t)t->near[s] + c];
-        }
-        bool is_far = (double)t->near_sq[s] > PAIR_WIDTHS * PAIR_WIDTHS * width * width;
-        if (!t->is_empty[s] && (facing < NPG_AGAINST || is_far)) continue;
-        memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
-        memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
-        if (t->is_empty[s])
-            add_stray(t, pose, &p, t->sample_pos + 3 * s, share, width);
-        else
-            add_pull(t, TO_POINTS, &p, pose, share, width);
+    const npg_tracker *t = s->t;
+    double facing = 0, weight = REVERSE / (double)t->sample_count;
+    size_t v = t->samples[i], near = t->near[i];
+    pull p;
+    term->count = 0;
+    if (!t->is_seen[i] && !t->is_empty[i]) return;
+    for (size_t c = 0; c < 3; c++) {
+        p.rest[c] = t->mesh->vert_pos[3 * v + c];
+        p.normal[c] = (double)t->vert_normals[3 * v + c];
+        p.target[c] = (double)s->cloud->points[3 * near + c];
+        if (s->normals) facing += p.normal[c] * (double)s->normals[3 * near + c];
     }
+    bool is_far = (double)t->near_sq[i] > PAIR_WIDTHS * PAIR_WIDTHS * s->width * s->width;
+    if (!t->is_empty[i] && (facing < NPG_AGAINST || is_far)) return;
+    memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
+    memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
+    if (t->is_empty[i])
+        set_stray(term, s, &p, t->sample_pos + 3 * i, weight);
+    else
+        set_pull(term, t, &p, s->pose, weight, s->width);
 }
 
-/* Edges keep their length and direction in the frame of each end, those at rest or those that are held. */
-static void add_edges(npg_tracker *t, const double *pose, double stiffness)
+/* Edge e / 2 keeps its length and direction in the frame of one end, as at rest or as it is held. */
+static void set_edge(npg_block_term *term, const step *s, size_t e)
 {
+    const npg_tracker *t = s->t;
     const npg_graph *graph = t->graph;
-    npg_block_term term = {.count = 2, .shares = {1, -1}};
-    for (size_t e = 0; e < 2 * t->prior.pair_count; e++) {
-        uint32_t j = t->prior.pairs[e / 2][e % 2], k = t->prior.pairs[e / 2][1 - e % 2];
-        const double *pj = pose + j * NPG_POSE_SIZE, *pk = pose + k * NPG_POSE_SIZE;
-        const float *gj = graph->node_pos + 3 * (size_t)j, *gk = graph->node_pos + 3 * (size_t)k;
-        double edge[3];
-        term.along = stiffness / (double)graph->edge_count * npg_prior_edge(edge, &t->prior, graph, e);
-        term.nodes[0] = j;
-        term.nodes[1] = k;
-        turn_arm(term.arms[0], pj, edge);
-        for (int i = 0; i < 3; i++)
-            term.right[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - term.arms[0][i];
-        npg_block_add(t->system, TO_POINTS, &term);
-    }
+    uint32_t j = t->prior.pairs[e / 2][e % 2], k = t->prior.pairs[e / 2][1 - e % 2];
+    const double *pj = s->pose + j * NPG_POSE_SIZE, *pk = s->pose + k * NPG_POSE_SIZE;
+    const float *gj = graph->node_pos + 3 * (size_t)j, *gk = graph->node_pos + 3 * (size_t)k;
+    double edge[3];
+    *term = (npg_block_term){.count = 2, .nodes = {j, k}, .shares = {1, -1}};
+    term->along = s->stiffness / (double)graph->edge_count * npg_prior_edge(edge, &t->prior, graph, e);
+    turn_arm(term->arms[0], pj, edge);
+    for (int i = 0; i < 3; i++)
+        term->right[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - term->arms[0][i];
 }
 
 /* ---- moving ---- */
@@ -422,68 +427,55 @@ void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const do
     npg_pose_vertices(vert_unit, tracker->whole, tracker->rows, tracker->reference->vert_pos);
 }
 
-/* ---- a step: two threads find the pairs of both directions, then each gathers the terms of one ---- */
+/* ---- a step: pairs of both directions, then terms, in grains of targets and samples, and of edges ---- */
 
-typedef struct step {
-    npg_tracker *t;
-    const double *pose;
-    const npg_kdtree *tree;
-    const npg_tracker_cloud *cloud;
-    double width, stiffness;
-    npg_tracked tracked[NPG_BLOCK_PARTS]; /* what each thread sums up ... */
-    size_t compared[NPG_BLOCK_PARTS];     /* ... over so many targets     */
-    bool is_first, is_settling;
-} step;
-
-/* The surface's nearest points of targets [first, last). */
-static npg_status find_on_surface(const step *s, size_t first, size_t last)
+/* What of [begin, begin + count) lies in a grain, counted from begin; empty where *first is *last. */
+static void clip(size_t *first, size_t *last, size_t grain, size_t begin, size_t count)
 {
-    const npg_tracker *t = s->t;
-    return npg_surface_closest_near(t->surface, t->hits + first, t->targets + 3 * first, last - first,
-                                    s->is_first ? NULL : t->start_face + first, 1);
+    size_t from = grain * GRAIN, to = from + GRAIN, end = begin + count;
+    *first = (from < begin ? begin : from > end ? end : from) - begin;
+    *last = (to < begin ? begin : to > end ? end : to) - begin;
 }
 
-static size_t lent_of(const npg_tracker *t, double share)
+static size_t grains_of(size_t count)
 {
-    return (size_t)(share * (double)t->target_count);
+    return (count + GRAIN - 1) / GRAIN;
 }
 
-/* To look on the surface takes longer, so the thread of the other direction lends a hand. */
+/* The first part makes the vertices' normals, which no pair asks for. */
 static npg_status find_pairs(void *user, size_t part)
 {
     const step *s = user;
     npg_tracker *t = s->t;
-    size_t lent = lent_of(t, LENT_PAIRS);
-    if (part == TO_SURFACE) return find_on_surface(s, lent, t->target_count);
-    npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
-                            t->mesh->face_count);
-    npg_rows_gather(t->sample_pos, t->vert_pos, t->samples, t->sample_count);
-    NPG_TRY(npg_kdtree_nearest(s->tree, t->near, t->near_sq, t->sample_pos, t->sample_count, 1, 1));
-    NPG_TRY(npg_visible_find(&t->visible, t->is_seen, t->surface, s->cloud->sensors, s->cloud->sensor_count,
-                             t->sample_pos, t->samples, t->vert_normals, t->sample_count,
-                             NPG_SEEN_OFFSET * t->size));
-    for (size_t i = 0; i < t->sample_count; i++)
+    size_t first, last;
+    if (!part) {
+        npg_mesh_vertex_normals(t->vert_normals, t->vert_pos, t->mesh->vert_count, t->mesh->faces,
+                                t->mesh->face_count);
+        return NPG_OK;
+    }
+    clip(&first, &last, part - 1, 0, t->target_count);
+    NPG_TRY(npg_surface_closest_near(t->surface, t->hits + first, t->targets + 3 * first, last - first,
+                                     s->is_first ? NULL : t->start_face + first, 1));
+    clip(&first, &last, part - 1, t->target_count, t->sample_count);
+    float *place = t->sample_pos + 3 * first;
+    npg_rows_gather(place, t->vert_pos, t->samples + first, last - first);
+    for (size_t i = first; i < last; i++)
         t->is_empty[i] = npg_free_space_is_empty(s->cloud->space, t->sample_pos + 3 * i);
-    return find_on_surface(s, 0, lent);
+    return npg_kdtree_nearest(s->tree, t->near + first, t->near_sq + first, place, last - first, 1, 1);
 }
 
-static npg_status add_terms(void *user, size_t part)
+static npg_status set_terms(void *user, size_t part)
 {
-    step *s = user;
-    npg_tracker *t = s->t;
-    size_t lent = lent_of(t, LENT_TERMS);
-    bool is_lent = part == TO_POINTS;
-    /* Near its end a fit has its parts in place: what still disagrees is a thin part's other side, which must
-     * not keep the points of this one, or a given normal that is wrong.  An open surface lacks other sides,
-     * whose points must not pull at what it has. */
-    const float *normals = s->is_settling && !t->is_open ? NULL : s->cloud->normals;
-    npg_block_clear(t->system, part);
-    add_targets(t, part, &s->tracked[part], &s->compared[part], is_lent ? 0 : lent,
-                is_lent ? lent : t->target_count, s->pose, s->cloud, normals != NULL, s->width);
-    if (part == TO_SURFACE) return NPG_OK;
-    add_samples(t, s->pose, s->cloud->points, normals, s->width);
-    npg_prior_see(&t->prior, t->graph, t->samples, t->is_seen, t->sample_count);
-    add_edges(t, s->pose, s->stiffness);
+    const step *s = user;
+    const npg_tracker *t = s->t;
+    size_t first, last, at = t->target_count;
+    clip(&first, &last, part, 0, t->target_count);
+    set_targets(s, first, last);
+    clip(&first, &last, part, at, t->sample_count);
+    for (size_t i = first; i < last; i++) set_sample(&t->terms[at + i], s, i);
+    at += t->sample_count;
+    clip(&first, &last, part, at, 2 * t->prior.pair_count);
+    for (size_t e = first; e < last; e++) set_edge(&t->terms[at + e], s, e);
     return NPG_OK;
 }
 
@@ -502,12 +494,39 @@ static double samples_chamfer(const npg_tracker *t)
 static npg_status gather(step *s)
 {
     npg_tracker *t = s->t;
+    size_t pairs = t->target_count + t->sample_count, terms = pairs + 2 * t->prior.pair_count;
+    /* Near its end a fit has its parts in place: what still disagrees is a thin part's other side, which must
+     * not keep the points of this one, or a given normal that is wrong.  An open surface lacks other sides,
+     * whose points must not pull at what it has. */
+    s->normals = s->is_settling && !t->is_open ? NULL : s->cloud->normals;
     npg_pose_rows(t->rows, t->graph, s->pose);
     npg_pose_vertices(t->vert_pos, t->graph, t->rows, t->mesh->vert_pos);
     NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
     for (size_t i = 0; i < t->target_count; i++) t->start_face[i] = t->hits[i].face;
-    NPG_TRY(npg_parallel(find_pairs, s, NPG_BLOCK_PARTS));
-    return npg_parallel(add_terms, s, NPG_BLOCK_PARTS);
+    NPG_TRY(npg_parallel(find_pairs, s, 1 + grains_of(pairs)));
+    NPG_TRY(npg_visible_find(&t->visible, t->is_seen, t->surface, s->cloud->sensors, s->cloud->sensor_count,
+                             t->sample_pos, t->samples, t->vert_normals, t->sample_count,
+                             NPG_SEEN_OFFSET * t->size));
+    npg_prior_see(&t->prior, t->graph, t->samples, t->is_seen, t->sample_count);
+    NPG_TRY(npg_parallel(set_terms, s, grains_of(terms)));
+    return npg_block_gather(t->system, t->terms, terms);
+}
+
+/* What the grains of targets come to, scaled as if all had been compared. */
+static void sum_up(npg_tracked *tracked, const npg_tracker *t)
+{
+    struct sums all = {0};
+    for (size_t g = 0; g < grains_of(t->target_count); g++) {
+        all.dist += t->sums[g].dist;
+        all.dist_sq += t->sums[g].dist_sq;
+        all.compared += t->sums[g].compared;
+        all.explained += t->sums[g].explained;
+    }
+    double share = 1 / (double)(all.compared ? all.compared : t->target_count);
+    tracked->point_dist_mean = share * all.dist;
+    tracked->point_dist_sq = share * all.dist_sq;
+    tracked->explained = (double)all.explained / (double)t->target_count;
+    tracked->chamfer = tracked->point_dist_sq + samples_chamfer(t);
 }
 
 /* How far a fit has come, 0..1 before the last steps. */
@@ -528,14 +547,7 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
 {
     npg_tracker *t = s->t;
     NPG_TRY(gather(s));
-    size_t compared = s->compared[TO_SURFACE] + s->compared[TO_POINTS];
-    double scale = compared && compared < t->target_count ? (double)t->target_count / (double)compared : 1;
-    tracked->point_dist_mean =
-        scale * (s->tracked[TO_SURFACE].point_dist_mean + s->tracked[TO_POINTS].point_dist_mean);
-    tracked->explained = s->tracked[TO_SURFACE].explained + s->tracked[TO_POINTS].explained;
-    tracked->point_dist_sq =
-        scale * (s->tracked[TO_SURFACE].point_dist_sq + s->tracked[TO_POINTS].point_dist_sq);
-    tracked->chamfer = tracked->point_dist_sq + samples_chamfer(t);
+    sum_up(tracked, t);
     npg_block_solve(t->system, t->step, 1e-9, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");

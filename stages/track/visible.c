@@ -51,7 +51,7 @@ npg_status npg_visible_find(npg_visible *visible, uint8_t *is_seen, const npg_su
         if (!isfinite(sensor[0] + sensor[1] + sensor[2])) continue;
         for (size_t i = 0; i < count; i++)
             aim(&visible->rays[i], sensor, places + 3 * i, vert_normals + 3 * (verts ? verts[i] : i), offset);
-        NPG_TRY(npg_surface_rays(surface, visible->hits, visible->rays, count, 1));
+        NPG_TRY(npg_surface_rays(surface, visible->hits, visible->rays, count, 0));
         for (size_t i = 0; i < count; i++)
             is_seen[i] |= visible->rays[i].t_max > 0 && visible->hits[i].face == UINT32_MAX;
     }

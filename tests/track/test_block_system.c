@@ -94,26 +94,25 @@ static double residual_of(const double *matrix, const double *right, const doubl
     return sqrt(off / all);
 }
 
-/* Both parts together solve what is written out in full. */
+/* The terms solve what is written out in full. */
 static void solves_the_terms(void **state)
 {
     static double matrix[SIZE * SIZE], right[SIZE], x[SIZE];
     static uint32_t pairs[PAIRS_MAX][2];
+    static npg_block_term terms[TERMS];
     npg_block_system *system;
     uint64_t seed = 1;
     (void)state;
     size_t pair_count = list_pairs(pairs, NODES);
-    assert_int_equal(npg_block_open(&system, NODES, (const uint32_t(*)[2])pairs, pair_count), NPG_OK);
+    assert_int_equal(npg_block_open(&system, NODES, (const uint32_t(*)[2])pairs, pair_count, TERMS), NPG_OK);
     for (int round = 0; round < 2; round++) { /* the second one finds what the first one left */
         memset(matrix, 0, sizeof matrix);
         memset(right, 0, sizeof right);
-        for (size_t part = 0; part < NPG_BLOCK_PARTS; part++) npg_block_clear(system, part);
         for (int i = 0; i < TERMS; i++) {
-            npg_block_term term;
-            random_term(&term, &seed, 9);
-            npg_block_add(system, (size_t)i % NPG_BLOCK_PARTS, &term);
-            add_in_full(matrix, right, &term);
+            random_term(&terms[i], &seed, 9);
+            add_in_full(matrix, right, &terms[i]);
         }
+        assert_int_equal(npg_block_gather(system, terms, TERMS), NPG_OK);
         for (int i = 0; i < SIZE; i++) matrix[(SIZE + 1) * i] += 0.01;
         int steps = npg_block_solve(system, x, 0.01, 1e-5, 1000);
         assert_in_range(steps, 2, 400);
@@ -131,8 +130,8 @@ static void leaves_out_what_is_no_pair(void **state)
         .count = 2, .nodes = {0, 5}, .shares = {0.5, 0.5}, .along = 1, .right = {1, 0, 0}};
     double x[6 * 6];
     (void)state;
-    assert_int_equal(npg_block_open(&system, 6, pairs, 1), NPG_OK);
-    npg_block_add(system, 0, &term);
+    assert_int_equal(npg_block_open(&system, 6, pairs, 1, 1), NPG_OK);
+    assert_int_equal(npg_block_gather(system, &term, 1), NPG_OK);
     npg_block_solve(system, x, 1e-9, 1e-6, 50);
     for (int node = 0; node < 6; node++)
         for (int i = 0; i < 6; i++) {
