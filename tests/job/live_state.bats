@@ -86,6 +86,11 @@ check_killed() {
     check_killed all "0 1" --method '{"window": 4, "overlap": 2}' --look-ahead 40
 }
 
+@test "grids over aligned poses: killed at two states it gives the same bytes" {
+    check_killed all "0 1" "${open[@]}" --method '{"preset": "grids", "width-1": 32, "width-2": 32, "grid-levels": 3}'
+    grep -q '"solver": "grids"' killed/report.json
+}
+
 @test "gaps, a file that can't be read, and a selection" {
     mkdir gaps
     cp all/* gaps

@@ -113,24 +113,35 @@ lines_of() {
     done
 }
 
-@test "in-between frames are nearer the truth than lines between meshes, and nothing leaps" {
+# In-between frames of run $1, made with further options: nearer the truth than lines between meshes, and no leap.
+check_between() {
+    local curves line
     fine_and_coarse
-    between_run wide
-    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-curves --fps-scale 2 --export obj
-    lines_of wide-curves wide-line
-    curves=$(odd_error wide-curves fine)
-    line=$(odd_error wide-line fine)
+    between_run "$@"
+    "$NEUPIG" apply "$1" --mesh "$1/reference.ply" -o "$1-curves" --fps-scale 2 --export obj
+    lines_of "$1-curves" "$1-line"
+    curves=$(odd_error "$1-curves" fine)
+    line=$(odd_error "$1-line" fine)
     echo "curves $curves, lines $line"
     awk -v w="$curves" -v l="$line" 'BEGIN { exit !(w > 0 && w < 0.95 * l) }'
     # nothing leaps where windows meet: a step of a 16th of a frame is never much longer than those beside it
-    "$NEUPIG" apply wide --mesh wide/reference.ply -o wide-steps --fps-scale 16 --export obj
-    for step in wide-steps/*.obj; do grep '^v ' "$step" | awk '{ print $2, $3, $4 }' >"$step.v"; done
+    "$NEUPIG" apply "$1" --mesh "$1/reference.ply" -o "$1-steps" --fps-scale 16 --export obj
+    for step in "$1-steps"/*.obj; do grep '^v ' "$step" | awk '{ print $2, $3, $4 }' >"$step.v"; done
     for k in $(seq 0 127); do
-        paste "$(printf wide-steps/frame_%04d.obj.v "$k")" "$(printf wide-steps/frame_%04d.obj.v $((k + 1)))" |
+        paste "$(printf "$1-steps/frame_%04d.obj.v" "$k")" "$(printf "$1-steps/frame_%04d.obj.v" $((k + 1)))" |
             awk '{ sum += sqrt(($1 - $4) ^ 2 + ($2 - $5) ^ 2 + ($3 - $6) ^ 2) } END { print sum / NR }'
     done >lengths
     awk '{ if (NR > 2 && last > 1.5 * $1 + 2e-5 && last > 1.5 * before + 2e-5) bad++; before = last; last = $1 }
         END { exit bad > 0 || NR != 128 }' lengths
+}
+
+@test "in-between frames by vertices are nearer the truth than lines between meshes, and nothing leaps" {
+    check_between wide
+}
+
+@test "in-between frames by grids are nearer the truth than lines between meshes, and nothing leaps" {
+    check_between grids --method '{"preset": "grids", "width-1": 32, "width-2": 32, "grid-levels": 3}'
+    grep -q '"solver": "grids"' grids/report.json
 }
 
 @test "a mesh that is missing is named before anything is written" {
