@@ -4,9 +4,9 @@
 #   tools/device_report.sh DEVICE [OUT]
 #
 # DEVICE: part of the device's name, its number, cpu, gpu or auto.  Environment: NEUPIG (the command), FRAMES ("17 120"),
-# POINTS (5000), EPOCHS (the preset's), BENCH_OPTIONS, RUN_OPTIONS.
+# POINTS (5000), EPOCHS (the preset's), BENCH_OPTIONS, RUN_OPTIONS, PEAK ("FLOPS BYTES" a second, of its data sheet).
 # All output lies in OUT (device_report/); the table comes last, and in OUT/report.md.  Exit code: that of the first part
-# that failed; without a device it says which platforms there are.
+# that failed, 7 where the decoder takes longer than PEAK lets expect; without a device it says which platforms there are.
 set -euo pipefail
 
 device=${1:?usage: tools/device_report.sh DEVICE [OUT]}
@@ -55,4 +55,10 @@ cells += [f"{figures[key]:.4g}" if figures.get(key) is not None else "-" for key
 print("| " + " | ".join(cells) + " |")
 PY
 done
+echo >>"$out/report.md"
+held=0
+reports=()
+for count in $frames; do reports+=("$out/paper_$count/report.json"); done
+"$(dirname "$0")/device_expectations.py" "$out/bench.json" "${reports[@]}" >>"$out/report.md" || held=$?
 cat "$out/report.md"
+exit "$held"
