@@ -97,6 +97,8 @@ bad_frames() {
     kept=$(grep -o '"keyframe":[0-9]*,"frames_bad":[0-9]*,"kept":true' report | sed 's/.*bad":\([0-9]*\),.*/\1/')
     for bad in $(grep -o '"frames_bad":[0-9]*' report | cut -d: -f2); do [ "$kept" -le "$bad" ]; done
     grep -q 'frames are below the bar: another is tried' two.log
+    "$NEUPIG" help report --json >schema
+    python3 "$BATS_TEST_DIRNAME/../runs/check_schema.py" schema two-out/report.json
     run_it 7 two --method "$method" --faces 800 --verbose # and it is there: nothing is tried again
     ! grep -q 'another is tried' two.log
 }
