@@ -425,10 +425,11 @@ static void report_attempts(npg_worker *worker, const npg_reference_loop *loop)
                                                     : "the one before is taken back");
 }
 
-static void tell(npg_worker *worker, const npg_reference_loop *loop, const npg_pass_result *result)
+static void tell(npg_worker *worker, const npg_reference_loop *loop, const npg_pass_result *result,
+                 bool was_open)
 {
     const npg_brief *brief = &loop->brief;
-    if (brief->is_attempt || loop->tried_count > 1) report_attempts(worker, loop);
+    if (was_open && (brief->is_attempt || loop->tried_count > 1)) report_attempts(worker, loop);
     if (!brief->is_attempt && !brief->takes_gathered)
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "the keyframe's surface does not explain all frames: what others show is left out");
@@ -455,12 +456,10 @@ static npg_status settle(npg_worker *worker)
                                                                        : (size_t)s->attempts);
     const npg_pass_result result = result_of(worker);
     *npg_own(worker, brief) = npg_reference_next(loop, &result);
-    if (before && was_open && !npg_reference_keeps_last(loop)) {
-        tell(worker, loop, &result);
+    tell(worker, loop, &result, was_open);
+    if (before && was_open && !npg_reference_keeps_last(loop))
         return npg_worker_publish(worker, &npg_fact_fused, before);
-    }
     npg_fused_close(&before);
-    tell(worker, loop, &result);
     return publish(worker);
 }
 

@@ -73,12 +73,15 @@ bad_frames() {
     run_it 7 again "${small[@]}" --bars residual=1
     cp again-out/frames.jsonl whole.jsonl
     tail -n 1 again.log >whole.line
-    rm -r again-out
-    "$NEUPIG" run again -o again-out "${small[@]}" --bars residual=1 >again.log 2>&1 &
-    pid=$!
-    while kill -0 $pid 2>/dev/null && [ "$(wc -l <again-out/frames.partial.jsonl 2>/dev/null || echo 0)" -lt 3 ]; do sleep 0.02; done
-    kill -KILL $pid 2>/dev/null || true
-    wait $pid || true
+    for _ in 1 2 3 4 5; do # it may be done before a busy machine has killed it
+        rm -r again-out
+        "$NEUPIG" run again -o again-out "${small[@]}" --bars residual=1 >again.log 2>&1 &
+        pid=$!
+        while kill -0 $pid 2>/dev/null && ! grep -qs '"index":2' again-out/frames.partial.jsonl; do sleep 0.005; done
+        kill -KILL $pid 2>/dev/null || true
+        wait $pid || true
+        [ -e again-out/done.json ] || break
+    done
     run_it 7 again "${small[@]}" --bars residual=1
     grep -q resumed_frames again-out/report.json
     cmp whole.jsonl again-out/frames.jsonl
