@@ -169,7 +169,8 @@ static int by_figure(const void *left, const void *right)
     return (a->judgement.mean > b->judgement.mean) - (a->judgement.mean < b->judgement.mean);
 }
 
-void npg_candidates_rank(npg_choice *choice, const npg_candidate *list, size_t count, int64_t key)
+/* Those that could be followed, the best first. */
+static void rank_candidates(npg_choice *choice, const npg_candidate *list, size_t count, int64_t key)
 {
     npg_candidate sorted[NPG_CHOICE_MAX];
     choice->ranked_count = 0;
@@ -228,7 +229,7 @@ static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_c
     NPG_TRY(npg_candidates_try(list, &count, &best, clouds, facts->plan.key, &settings));
     if (!count) return NPG_OK;
     *chosen = list[best];
-    npg_candidates_rank(npg_own(worker, choice), list, count, chosen->index);
+    rank_candidates(npg_own(worker, choice), list, count, chosen->index);
     report_candidates(worker, list, count, npg_clock_s() - since);
     npg_worker_log(worker, NPG_LOG_INFO, chosen->number, "is the keyframe, of %zu candidates (judged %.3f)",
                    count, chosen->judgement.mean);

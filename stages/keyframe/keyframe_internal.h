@@ -103,9 +103,6 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
                               const npg_candidate_clouds *clouds, int64_t scored,
                               const npg_poisson_settings *settings);
 
-/* choice->ranked: the candidates other than `key` that could be followed, the best first. */
-void npg_candidates_rank(npg_choice *choice, const npg_candidate *list, size_t count, int64_t key);
-
 /* Choosing pass: reads the frames of facts.choice, and takes the best of its candidates for the keyframe. */
 
 /* The frames read so far; zeroed before the pass. */
