@@ -85,33 +85,95 @@ void npg_normals_face_sensor(float *normals, size_t *flipped, const float *point
 
 /* ---- winding number ---- */
 
-static npg_status turn_to_field(float *normals, size_t *flipped, const float *points, const float *given,
-                                size_t n)
+/* away[i] = whether normal i faces against the field: that of the points alone, or one that begins with `given`. */
+static npg_status find_away(uint8_t *away, npg_arena *arena, const float *normals, const float *points,
+                            const float *given, size_t n)
 {
-    float *field;
-    *flipped = 0;
-    NPG_TRY(npg_alloc_array(&field, NPG_FOR_FRAMES, n, 3 * sizeof *field));
+    float *field = npg_arena_take(arena, n, 3 * sizeof *field);
+    NPG_TRY(npg_arena_status(arena));
     memcpy(field, normals, n * 3 * sizeof *field);
-    npg_status status = npg_winding_normals(field, points, given, n);
-    for (size_t i = 0; i < n && !status; i++) {
-        if (npg_vec3_dotf(normals + 3 * i, field + 3 * i) >= 0) continue;
+    NPG_TRY(npg_winding_normals(field, points, given, n));
+    for (size_t i = 0; i < n; i++) away[i] = npg_vec3_dotf(normals + 3 * i, field + 3 * i) < 0;
+    return NPG_OK;
+}
+
+/* Whether two neighbours' sides say the same: they look the same way, or they are the two sides of a sheet or of a gap,
+ * one more behind or before the other than beside it. */
+static bool sides_agree(const float *p, const float *n, const float *q, const float *m)
+{
+    float d[3], along_n, along_m, least;
+    if (npg_vec3_dotf(n, m) > 0) return true;
+    for (int a = 0; a < 3; a++) d[a] = q[a] - p[a];
+    along_n = npg_vec3_dotf(d, n);
+    along_m = npg_vec3_dotf(d, m);
+    least = npg_vec3_dotf(d, d) / 2;
+    return along_n * along_n > least && along_m * along_m > least;
+}
+
+/* Neighbours whose sides agree are one patch. */
+static npg_status find_patches(uint32_t *parent, npg_arena *arena, const float *points, const float *given,
+                               size_t n)
+{
+    npg_neighbours near;
+    NPG_TRY(npg_neighbours_take(&near, arena, points, n, points, n, NPG_AROUND));
+    for (uint32_t i = 0; i < n; i++) parent[i] = i;
+    for (uint32_t i = 0; i < n; i++)
+        for (size_t k = 0; k < NPG_AROUND; k++) {
+            uint32_t j = near.index[NPG_AROUND * i + k];
+            if (j == UINT32_MAX) break;
+            const float *p = points + 3 * (size_t)i, *q = points + 3 * (size_t)j;
+            if (sides_agree(p, given + 3 * (size_t)i, q, given + 3 * (size_t)j)) npg_set_join(parent, i, j);
+        }
+    return NPG_OK;
+}
+
+/* A patch turns as a whole, if at all: the field is as coarse as the points, but sides that agree along a sheet thinner
+ * than their spacing were known to who gave them. */
+static npg_status let_patches_vote(uint8_t *away, npg_arena *arena, const float *points, const float *given,
+                                   size_t n)
+{
+    uint32_t *parent = npg_arena_take(arena, n, sizeof *parent);
+    int32_t *votes = npg_arena_take(arena, n, sizeof *votes); /* of roots */
+    NPG_TRY(npg_arena_status(arena));
+    NPG_TRY(find_patches(parent, arena, points, given, n));
+    for (uint32_t i = 0; i < n; i++) votes[npg_set_root(parent, i)] += away[i] ? 1 : -1;
+    for (uint32_t i = 0; i < n; i++) away[i] = votes[npg_set_root(parent, i)] > 0;
+    return NPG_OK;
+}
+
+static void turn(float *normals, size_t *turned, const uint8_t *away, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        if (!away[i]) continue;
         for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
-        ++*flipped;
+        ++*turned;
     }
-    npg_release(&field);
-    return status;
 }
 
 /* Of large clouds the field has sides, but directions only as coarse as the points it is made of. */
 npg_status npg_normals_make(float *normals, const float *points, size_t n)
 {
-    size_t flipped;
+    npg_arena arena = {.purpose = NPG_FOR_FRAMES};
+    size_t turned = 0;
     NPG_TRY(npg_normals_estimate(normals, points, n, NPG_NEIGHBOURS));
     if (npg_winding_is_whole(n)) return npg_winding_normals(normals, points, NULL, n);
-    return turn_to_field(normals, &flipped, points, NULL, n);
+    uint8_t *away = npg_arena_take(&arena, n, 1);
+    npg_status status = npg_arena_status(&arena);
+    if (!status) status = find_away(away, &arena, normals, points, NULL, n);
+    if (!status) turn(normals, &turned, away, n);
+    npg_arena_release(&arena);
+    return status;
 }
 
 npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t n)
 {
-    return turn_to_field(normals, flipped, points, normals, n);
+    npg_arena arena = {.purpose = NPG_FOR_FRAMES};
+    uint8_t *away = npg_arena_take(&arena, n, 1);
+    npg_status status = npg_arena_status(&arena);
+    *flipped = 0;
+    if (!status) status = find_away(away, &arena, normals, points, normals, n);
+    if (!status) status = let_patches_vote(away, &arena, points, normals, n);
+    if (!status) turn(normals, flipped, away, n);
+    npg_arena_release(&arena);
+    return status;
 }
