@@ -7,6 +7,7 @@
 
 #include "evaluate/evaluate_internal.h"
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "job/job.h"
 #include "pipeline/file.h"
 #include "pipeline/options.h"
@@ -224,23 +225,29 @@ static json_t *json_of_sums(const evaluate_state *state)
     return figures;
 }
 
-/* The verdict in figures, and in words. */
-static void report_verdict(json_t *report, const evaluate_state *state)
+/* The verdict in figures, and in words.  unseen: of the area of the reference, what no point that it is made
+ * of lies near. */
+static void report_verdict(json_t *report, const evaluate_state *state, double unseen)
 {
     const aggregate *median = &state->sums[NPG_FIGURE_MEDIAN], *p95 = &state->sums[NPG_FIGURE_P95];
     size_t frames = state->good_count + state->bad_count + state->skipped_count;
     double percent = median->count ? 100 * median->sum / (double)median->count : (double)NAN;
     int64_t worst = state->bad_count ? state->worst_number : p95->worst_number;
-    char why[256], middle[64] = "", text[512];
+    char why[256], middle[128] = "", text[512];
+    int length = 0;
     if (state->bad_count)
         snprintf(why, sizeof why, "%s %.3g, the bar %.3g", fault_texts[state->worst.kind], state->worst.value,
                  state->worst.bound);
     else
         snprintf(why, sizeof why, "95 %% of its points within %.2g %%", 100 * p95->worst);
-    json_t *quality = json_pack("{sI sI so}", "good", (json_int_t)state->good_count, "frames",
-                                (json_int_t)frames, "median_percent", npg_json_real(percent));
-    if (median->count) snprintf(middle, sizeof middle, ", median %.2g %%", percent);
-    int length = snprintf(text, sizeof text, "%zu of %zu frames good%s", state->good_count, frames, middle);
+    json_t *quality =
+        json_pack("{sI sI so sf}", "good", (json_int_t)state->good_count, "frames", (json_int_t)frames,
+                  "median_percent", npg_json_real(percent), "unseen_percent", 100 * unseen);
+    if (median->count) length = snprintf(middle, sizeof middle, ", median %.2g %%", percent);
+    if (unseen > NPG_FEW)
+        snprintf(middle + length, sizeof middle - (size_t)length, ", %.2g %% of the surface without points",
+                 100 * unseen);
+    length = snprintf(text, sizeof text, "%zu of %zu frames good%s", state->good_count, frames, middle);
     if (state->bad_count || p95->count) {
         json_object_update_new(quality, json_pack("{sI ss}", "worst_frame", (json_int_t)worst, "worst", why));
         snprintf(text + length, sizeof text - (size_t)length, ", worst frame %" PRId64 " (%s)", worst, why);
@@ -276,7 +283,7 @@ static npg_status flush(npg_worker *worker)
     json_object_update_new(report, json_pack("{so sI sI so}", "figures", json_of_sums(state), "good",
                                              (json_int_t)state->good_count, "skipped",
                                              (json_int_t)state->skipped_count, "bad", bad));
-    report_verdict(report, state);
+    report_verdict(report, state, npg_worker_facts(worker)->unseen_share);
     /* A resumed run has not warned itself of those that it restored. */
     if (state->bad_count > (npg_worker_facts(worker)->is_resumed ? 0 : WARNINGS_MAX))
         npg_worker_warn(worker, true, -1, "%zu frames are below the bar; the report lists them",

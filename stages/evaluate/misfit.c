@@ -15,11 +15,10 @@
 #define LINK_SPACINGS  2.0 /* between neighbours in a cluster of far points                         */
 #define LINKS          6   /* neighbours that are searched for others of the cluster                */
 #define STRETCH_LEAST  1.5 /* times an edge's length in the reference                               */
-#define OFF_SHARE      0.6 /* of the reach: stretched surface lies off the points                        */
 #define LEAST_FAR      12  /* points in a place                                                     */
 #define LEAST_MISSED   20  /* points that would lie on a place of the surface                       */
 #define LEAST_VERTS    6   /* vertices whose mean area it has                                       */
-#define VACATED_SHARE  0.6 /* of the points that a part should have                                 */
+#define MOST_OF        0.6 /* of the points that a part should have; of the reach, which stretched surface is off */
 
 struct npg_misfit_finder {
     npg_arena arena;           /* of all below, but for the edges               */
@@ -200,8 +199,7 @@ static void find_vacated(npg_misfit_finder *f, npg_misfit *misfit, const npg_mis
         if (!(sum[0] > 0)) continue;
         double expected = (double)frame->point_count * sum[0] / whole, missing = expected - sum[4];
         double share = missing / (double)frame->point_count;
-        if (!(sum[4] < VACATED_SHARE * expected) || missing < LEAST_MISSED || share <= misfit->share)
-            continue;
+        if (!(sum[4] < MOST_OF * expected) || missing < LEAST_MISSED || share <= misfit->share) continue;
         misfit->share = share;
         for (size_t a = 0; a < 3; a++) misfit->at[a] = sum[1 + a] / sum[0];
     }
@@ -220,5 +218,5 @@ npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_
     find_vacated(f, &misfits[NPG_MISFIT_VACATED], frame);
     flag_off(f, frame, reach);
     NPG_TRY(take_flagged(&misfits[NPG_MISFIT_UNSUPPORTED], f, frame));
-    return find_stretched(f, &misfits[NPG_MISFIT_STRETCHED], frame, OFF_SHARE * reach);
+    return find_stretched(f, &misfits[NPG_MISFIT_STRETCHED], frame, MOST_OF * reach);
 }

@@ -330,6 +330,16 @@ npg_status npg_mesh_keep_faces(npg_mesh **mesh, const uint8_t *keep_face);
 /* out (count x 3) = the rows of rows (x 3) that which[] names. */
 void npg_rows_gather(float *out, const float *rows, const uint32_t *which, size_t count);
 
+/* The i-th of `count` directions that are spread evenly over the sphere (a Fibonacci lattice). */
+static inline void npg_direction_spread(double direction[3], size_t i, size_t count)
+{
+    const double turn = 2.399963229728653; /* the golden angle */
+    double z = 1 - (2 * (double)i + 1) / (double)count, r = sqrt(1 - z * z);
+    direction[0] = r * cos(turn * (double)i);
+    direction[1] = r * sin(turn * (double)i);
+    direction[2] = z;
+}
+
 /* Which of n things is the i-th of `count` that are spread evenly over them. */
 static inline size_t npg_spread_index(size_t i, size_t count, size_t n)
 {

@@ -22,8 +22,7 @@ npg_status npg_points_dist(float *dist, const float *queries, size_t query_count
     return status;
 }
 
-/* Keep the faces whose keep_face is not 0.  *share gets the share of the area that went. */
-static npg_status keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face)
+npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face)
 {
     double total = 0, gone = 0;
     for (size_t f = 0; f < (*mesh)->face_count; f++) {
@@ -51,7 +50,7 @@ npg_status npg_mesh_trim(npg_mesh **mesh, double *share, const float *points, si
     if (!status) status = npg_points_dist(dist, (*mesh)->vert_pos, (*mesh)->vert_count, points, point_count);
     for (size_t f = 0; f < face_count && !status; f++)
         keep_face[f] = (double)farthest_corner(dist, (*mesh)->faces + 3 * f) <= dist_max;
-    if (!status) status = keep_share(mesh, share, keep_face);
+    if (!status) status = npg_mesh_keep_share(mesh, share, keep_face);
     npg_arena_release(&scratch);
     return status;
 }
@@ -131,7 +130,7 @@ npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double size)
     for (size_t i = 0; i < pieces->found && !status; i++) pieces->kept += is_kept[i];
     for (size_t f = 0; f < face_count && !status; f++)
         keep_face[f] = is_kept[component_of[(*mesh)->faces[3 * f]]];
-    if (!status) status = keep_share(mesh, &pieces->lost_share, keep_face);
+    if (!status) status = npg_mesh_keep_share(mesh, &pieces->lost_share, keep_face);
     npg_arena_release(&scratch);
     return status;
 }
@@ -219,7 +218,7 @@ npg_status npg_mesh_trim_shreds(npg_mesh **mesh, double *share, double width)
     npg_status status = find_core(&f, &found, width);
     for (size_t i = 0; i < (*mesh)->face_count && !status && found; i++)
         keep_face[i] = (double)farthest_corner(f.dist, (*mesh)->faces + 3 * i) <= BACK * width;
-    if (!status && found) status = keep_share(mesh, share, keep_face);
+    if (!status && found) status = npg_mesh_keep_share(mesh, share, keep_face);
     npg_arena_release(&f.arena);
     return status;
 }

@@ -201,6 +201,15 @@ npg_status npg_mesh_denoise(npg_mesh *mesh, const float *points, const float *no
 
 /* Unseen: which vertices of the finished reference no point supports that it was made from. */
 
+/* Keep the faces whose keep_face (F) is not 0.  *share gets the share of the area that went. */
+npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face);
+
+/* Expected: drop the patches of surface without points (farther than dist_max from all N, by the mean of a face's
+ * vertices) where all but NPG_FEW of what faces the same way has some: they would have been seen if they were there
+ * (expected.c has the formula).  *share: of the area, what went.  NPG_MEMORY. */
+npg_status npg_mesh_trim_expected(npg_mesh **mesh, double *share, const float *points, size_t point_count,
+                                  double dist_max);
+
 /* Set mesh->vert_unseen: the vertices that are farther than dist_max from all N points (N x 3).  NPG_MEMORY. */
 npg_status npg_mesh_mark_unseen(npg_mesh *mesh, const float *points, size_t point_count, double dist_max);
 

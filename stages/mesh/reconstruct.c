@@ -101,6 +101,23 @@ static npg_status keep_main(reconstruction *r, const char *when)
 
 /* ---- what lies near the points ---- */
 
+/* One frame misses what another sees; all of them have seen what there is to see. */
+static npg_status trim_expected(reconstruction *r)
+{
+    const npg_point_set *p = r->set;
+    double share;
+    if (!p->is_fused || r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
+    NPG_TRY(npg_mesh_trim_expected(&r->mesh, &share, p->points, p->count, p->seen_dist));
+    npg_mesh_note(r->worker, "would_be_seen_share", share);
+    if (share > NPG_FEW)
+        npg_mesh_warn(
+            r->worker, false, p->key_number,
+            "%.1f %% of the reconstructed surface has no point near it in any frame, though all else "
+            "that faces the same way has some: no surface, trimmed off",
+            100 * share);
+    return NPG_OK;
+}
+
 /* What no point saw: measured on the closed surface, before anything is trimmed. */
 static npg_status judge_unseen(reconstruction *r)
 {
@@ -243,6 +260,7 @@ static npg_status make(reconstruction *r)
 {
     bool sound;
     NPG_TRY(draw_surface(r));
+    NPG_TRY(trim_expected(r));
     NPG_TRY(judge_unseen(r));
     /* Of a side all parts are small beside the balloon that closes it, until that is trimmed. */
     if (!r->trims_unseen) NPG_TRY(keep_main(r, "as reconstructed"));

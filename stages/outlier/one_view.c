@@ -117,16 +117,6 @@ typedef struct search {
     double best[3];        /* direction from the cloud's middle */
 } search;
 
-/* The i-th of `count` directions that are spread evenly (a Fibonacci lattice). */
-static void spread_direction(double direction[3], size_t i, size_t count)
-{
-    const double turn = 2.399963229728653; /* the golden angle */
-    double z = 1 - (2 * (double)i + 1) / (double)count, r = sqrt(1 - z * z);
-    direction[0] = r * cos(turn * (double)i);
-    direction[1] = r * sin(turn * (double)i);
-    direction[2] = z;
-}
-
 static void place_of(double sensor[3], const search *s, const double direction[3])
 {
     double away = DISTANCE * npg_bounds_diagonal(&s->bounds);
@@ -149,7 +139,7 @@ static double try_places(search *s, double *shares, size_t place_count, const do
     for (size_t i = 0; i < place_count; i++) {
         double direction[3];
         view v;
-        spread_direction(direction, i, place_count);
+        npg_direction_spread(direction, i, place_count);
         shares[i] = INFINITY;
         if (near && fabs(npg_vec3_dot(direction, near)) < NEAR_COSINE) continue;
         if (!aim(&v, s, direction)) continue;
@@ -170,7 +160,7 @@ static void take_mean(search *s, const double *shares, size_t place_count, doubl
         for (size_t i = 0; i < place_count; i++) {
             double direction[3], weight = least + AS_GOOD - shares[i];
             if (!(weight > 0)) continue;
-            spread_direction(direction, i, place_count);
+            npg_direction_spread(direction, i, place_count);
             if (npg_vec3_dot(direction, s->best) < 0) weight = -weight;
             for (int a = 0; a < 3; a++) mean[a] += weight * direction[a];
         }

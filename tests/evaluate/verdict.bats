@@ -22,14 +22,14 @@ setup_file() {
         echo "$text"
         [ "$(tail -1 $name.log)" = "$text: neupig view $name-out" ]
         for file in report done; do # which have 9 and 12 digits
-            sed -n '2,/"look"/{s/^ *//;s/\(0\.[0-9]\{6\}\)[0-9]*/\1/;p}' $name-out/$file.json >$file.top
+            sed -n '2,/"look"/{s/^ *//;s/\(\.[0-9]\{4\}\)[0-9]*/\1/;p}' $name-out/$file.json >$file.top
         done
         diff report.top done.top
         grep -q "\"look\": \"neupig view $name-out\"" $name-out/done.json
     done
-    [[ "$(tail -1 one.log)" == "0 of 14 frames good, median "*" %, worst frame "*"share of the surface that no points support"* ]]
+    [[ "$(tail -1 one.log)" == "0 of 14 frames good, median "*" %, "*" % of the surface without points, worst frame "*"share of the surface that no points support"* ]]
     [[ "$(tail -1 clean.log)" == "14 of 14 frames good, median "*" %, worst frame "*"95 % of its points within"* ]]
-    sed -n '/"quality": {/,/}/p' one-out/done.json | tr -d ' \n' | grep -q '"good":0,"frames":14,"median_percent":[0-9.]*,"worst_frame":[0-9]*,"worst":"share'
+    sed -n '/"quality": {/,/}/p' one-out/done.json | tr -d ' \n' | grep -q '"good":0,"frames":14,"median_percent":[0-9.]*,"unseen_percent":[0-9.]*,"worst_frame":[0-9]*,"worst":"share'
 }
 
 setup() {

@@ -102,6 +102,19 @@ static void normals_given_inward_are_turned(void **state)
     assert_int_equal(wrong_sides(), 0);
 }
 
+/* Both sides of a sheet thinner than the points are apart: nothing but what is given says which is which. */
+static void sides_of_a_thin_sheet_are_believed(void **state)
+{
+    (void)state;
+    const double sheet[3] = {1, 0.8, 0.01};
+    size_t flipped;
+    shape_random r = {29};
+    shape_box(points, truth, N, sheet, &r);
+    memcpy(normals, truth, sizeof truth);
+    assert_int_equal(npg_normals_mend(normals, &flipped, points, N), NPG_OK);
+    assert_true(wrong_sides() <= N / 100); /* of the rim */
+}
+
 static void the_scale_does_not_matter(void **state)
 {
     (void)state;
@@ -210,6 +223,6 @@ int main(void)
         cmocka_unit_test(given_normals_are_mended),     cmocka_unit_test(normals_given_inward_are_turned),
         cmocka_unit_test(the_scale_does_not_matter),    cmocka_unit_test(a_sensor_decides),
         cmocka_unit_test(noise_is_told_from_curvature), cmocka_unit_test(the_same_every_time),
-        cmocka_unit_test(refused_memory_is_survived)};
+        cmocka_unit_test(refused_memory_is_survived),   cmocka_unit_test(sides_of_a_thin_sheet_are_believed)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
