@@ -1,5 +1,6 @@
 /* Free space: what the depth images of a frame say of places. */
 #include <math.h>
+#include <string.h>
 
 #include "geometry/geometry.h"
 #include "pipeline/memory.h"
@@ -111,14 +112,20 @@ void npg_free_space_close(npg_free_space **space)
 
 /* ---- looking ---- */
 
-static npg_sight_kind look(const view *v, const float place[3], double *margin)
+/* A place in the sensor's axes. */
+static void see_from(double at[3], const view *v, const float place[3])
 {
-    double at[3];
     for (int a = 0; a < 3; a++) {
         const double *row = v->to_sensor + 4 * a;
         at[a] = row[3];
         for (int c = 0; c < 3; c++) at[a] += row[c] * (double)place[c];
     }
+}
+
+static npg_sight_kind look(const view *v, const float place[3], double *margin)
+{
+    double at[3];
+    see_from(at, v, place);
     if (!(at[2] > 0)) return NPG_SEEN_UNKNOWN;
     double x = floor((at[0] / at[2] - v->first[0]) / v->step),
            y = floor((at[1] / at[2] - v->first[1]) / v->step);
@@ -151,6 +158,71 @@ bool npg_free_space_is_empty(const npg_free_space *space, const float place[3])
     if (!space) return false;
     npg_sight_kind kind = npg_free_space_look(space, place);
     return kind == NPG_SEEN_EMPTY || kind == NPG_SEEN_BESIDE;
+}
+
+/* ---- the way out ---- */
+
+/* In the sensor's axes. */
+typedef struct way_out {
+    double from[3], to[3], dist_sq;
+} way_out;
+
+/* On the ray of a cell: what was seen, or the nearest place behind it. */
+static void try_cell(way_out *way, const view *v, ptrdiff_t x, ptrdiff_t y)
+{
+    if (x < 0 || y < 0 || x >= v->width || y >= v->height) return;
+    double depth = (double)v->cells[y * v->width + x], to[3], off[3];
+    const double ray[3] = {v->first[0] + ((double)x + 0.5) * v->step,
+                           v->first[1] + ((double)y + 0.5) * v->step, 1};
+    if (!(depth > 0) || isinf(depth)) return;
+    depth = fmax(depth, npg_vec3_dot(ray, way->from) / npg_vec3_dot(ray, ray));
+    for (int a = 0; a < 3; a++) to[a] = depth * ray[a];
+    npg_vec3_sub(off, to, way->from);
+    if (!(npg_vec3_dot(off, off) < way->dist_sq)) return;
+    way->dist_sq = npg_vec3_dot(off, off);
+    memcpy(way->to, to, sizeof to);
+}
+
+/* Ring by ring around the place's own cell, for as long as a ring may hold a nearer place: none of its rays, at
+ * most `longest` times their depth long, comes nearer than the ring is at the place's depth, over that. */
+static void search(way_out *way, const view *v)
+{
+    double slope[3] = {0, 0, 1};
+    ptrdiff_t own[2];
+    for (int a = 0; a < 2; a++) {
+        double last = v->first[a] + (double)(a ? v->height : v->width) * v->step;
+        slope[a] = fmax(fabs(v->first[a]), fabs(last));
+        own[a] = (ptrdiff_t)floor((way->from[a] / way->from[2] - v->first[a]) / v->step);
+    }
+    double ring = v->step * way->from[2] / npg_vec3_length(slope);
+    for (ptrdiff_t r = 0; r < v->width + v->height; r++) {
+        double least = fmax(0, ((double)r - 0.5) * ring);
+        if (least * least > way->dist_sq) return;
+        for (ptrdiff_t y = -r; y <= r; y++)
+            for (ptrdiff_t x = -r; x <= r; x += !r || y == r || y == -r ? 1 : 2 * r)
+                try_cell(way, v, own[0] + x, own[1] + y);
+    }
+}
+
+bool npg_free_space_leave(const npg_free_space *space, float to[3], const float place[3])
+{
+    double margin, nearest_sq = HUGE_VAL;
+    for (size_t i = 0; i < space->count; i++) {
+        const view *v = &space->views[i];
+        npg_sight_kind kind = look(v, place, &margin);
+        if (kind != NPG_SEEN_EMPTY && kind != NPG_SEEN_BESIDE) continue;
+        way_out way = {.dist_sq = nearest_sq};
+        see_from(way.from, v, place);
+        search(&way, v);
+        if (!(way.dist_sq < nearest_sq)) continue;
+        nearest_sq = way.dist_sq;
+        for (int a = 0; a < 3; a++) way.to[a] -= way.from[a];
+        for (int c = 0; c < 3; c++) {
+            to[c] = place[c];
+            for (int a = 0; a < 3; a++) to[c] += (float)(v->to_sensor[4 * a + c] * way.to[a]);
+        }
+    }
+    return isfinite(nearest_sq);
 }
 
 double npg_free_space_margin(const npg_free_space *space, const float place[3])

@@ -710,6 +710,11 @@ void npg_free_space_close(npg_free_space **space);
 npg_sight_kind npg_free_space_look(const npg_free_space *space, const float place[3]);
 bool npg_free_space_is_empty(const npg_free_space *space, const float place[3]);
 
+/* to = the nearest place out of what a sensor saw to be empty: of those on the rays of the cells in which it
+ * measured a depth, at that depth or farther.  Of several sensors that say so the one with the nearest.  false, with
+ * `to` as it was, where the place is not empty or nothing was measured.  Thread-safe. */
+bool npg_free_space_leave(const npg_free_space *space, float to[3], const float place[3]);
+
 /* How far off a place that was seen may lie from what was seen there: m of the sensor that sees it best; 0
  * where none sees it.  Thread-safe. */
 double npg_free_space_margin(const npg_free_space *space, const float place[3]);

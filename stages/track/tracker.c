@@ -321,11 +321,17 @@ static void set_targets(const step *s, size_t first, size_t last)
     if (first < last) t->sums[first / GRAIN] = sums;
 }
 
-/* Surface where nothing is goes towards the nearest point, seen or not, however far that is. */
+/* Surface where nothing is goes the shortest way out of there, seen or not, however far that is: the nearest point
+ * may be of what stands far behind it. */
 static void set_stray(npg_block_term *term, const step *s, pull *p, const float *place, double weight)
 {
     double way[3];
-    for (size_t c = 0; c < 3; c++) p->normal[c] = way[c] = p->target[c] - (double)place[c];
+    float to[3];
+    if (!npg_free_space_leave(s->cloud->space, to, place)) return;
+    for (size_t c = 0; c < 3; c++) {
+        p->target[c] = (double)to[c];
+        p->normal[c] = way[c] = p->target[c] - (double)place[c];
+    }
     if (!npg_vec3_make_unit(p->normal)) return;
     set_pull(term, s->t, p, s->pose, weight, fmax(s->width, npg_vec3_length(way)));
 }

@@ -81,6 +81,41 @@ static void a_margin_is_three_cells_of_the_best_sensor(void **state)
     npg_free_space_close(&space);
 }
 
+/* Before a wall at z = 2 the square at z = 0 is nearer from where it is hardly missed, and the wall from far off. */
+static void the_shortest_way_out_is_found(void **state)
+{
+    static scene s;
+    npg_free_space *space;
+    float to[3] = {7, 7, 7};
+    (void)state;
+    make_scene(&s, 6);
+    assert_int_equal(npg_free_space_open(&space, &s.frame, &unit), NPG_OK);
+    assert_false(npg_free_space_leave(space, to, (const float[3]){0, 0, 0.05f}));
+    assert_float_equal(to[0], 7, 0);
+    assert_true(npg_free_space_leave(space, to, (const float[3]){0.1f, 0, -1}));
+    assert_true(fabsf(to[2]) < 1e-5F && fabsf(to[0] - 0.1f) < 0.1F); /* ahead, onto the square */
+    assert_true(npg_free_space_leave(space, to, (const float[3]){0.7f, 0, 0.5f}));
+    assert_true(fabsf(to[0] - 0.4275F) < 0.03F); /* sideways, behind its last column */
+    assert_float_equal(to[2], 0.5, 0.05);
+    assert_true(npg_free_space_leave(space, to, (const float[3]){1.5f, 0, 1.5f}));
+    assert_float_equal(to[2], 2, 0.05); /* onto the wall */
+    npg_free_space_close(&space);
+}
+
+static void without_any_depth_there_is_no_way_out(void **state)
+{
+    static scene s;
+    npg_free_space *space;
+    float to[3] = {7, 7, 7};
+    (void)state;
+    make_scene(&s, INFINITY);
+    for (int i = 0; i < SIDE * SIDE; i++) s.cells[i] = INFINITY;
+    assert_int_equal(npg_free_space_open(&space, &s.frame, &unit), NPG_OK);
+    assert_false(npg_free_space_leave(space, to, (const float[3]){0, 0, 0}));
+    assert_float_equal(to[0], 7, 0);
+    npg_free_space_close(&space);
+}
+
 static void what_is_not_known_is_not_empty(void **state)
 {
     static scene s;
@@ -165,6 +200,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_sensor_says_five_things),
         cmocka_unit_test(a_margin_is_three_cells_of_the_best_sensor),
+        cmocka_unit_test(the_shortest_way_out_is_found),
+        cmocka_unit_test(without_any_depth_there_is_no_way_out),
         cmocka_unit_test(what_is_not_known_is_not_empty),
         cmocka_unit_test(a_background_that_was_measured_is_no_end),
         cmocka_unit_test(one_of_two_sensors_is_enough),
