@@ -63,7 +63,6 @@ typedef struct state {
     npg_skin *skin;
     npg_cells *cells;
     npg_carving *empty;        /* NULL: it is not known where sensors stood */
-    npg_votes *votes;          /* NULL: no frame has images yet                   */
     npg_colour_cells *colours; /* NULL: the points have no colours, or none are wanted */
     int64_t key;               /* index of the keyframe */
     double spacing, noise;     /* of the keyframe's points */
@@ -187,8 +186,6 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
                                  EMPTY_BAND * s->spacing, EMPTY_MOST));
     NPG_TRY(npg_free_space_open(&seen.space, frame, &facts->box));
     npg_status status = npg_carving_see(s->empty, s->skin, &seen);
-    if (!status && seen.space && !s->votes) status = npg_votes_open(&s->votes, facts->reference);
-    if (!status && seen.space) npg_votes_cast(s->votes, seen.space, frame->vert_unit);
     npg_free_space_close(&seen.space);
     return status;
 }
@@ -308,15 +305,6 @@ static npg_status collect_empty(const state *s, npg_fused *fused)
     return NPG_OK;
 }
 
-static npg_status collect_votes(const npg_worker *worker, npg_fused *fused)
-{
-    const state *s = npg_worker_state(worker);
-    if (!s->votes) return NPG_OK;
-    NPG_TRY(
-        npg_alloc(&fused->is_contradicted, NPG_FOR_MESH, npg_worker_facts(worker)->reference->vert_count));
-    return npg_votes_count(s->votes, fused->is_contradicted, CONTRADICTED);
-}
-
 static void report_gathered(npg_worker *worker, const npg_fused *fused)
 {
     const state *s = npg_worker_state(worker);
@@ -343,7 +331,6 @@ static npg_status publish(npg_worker *worker)
     npg_status status = collect(worker, fused);
     if (!status) status = collect_colours(s, fused);
     if (!status) status = collect_empty(s, fused);
-    if (!status) status = collect_votes(worker, fused);
     if (status) {
         npg_fused_close(&fused);
         return status;
@@ -400,7 +387,7 @@ static npg_pass_result result_of(const npg_worker *worker)
                               .explained_from = facts->has_changed[1] ? facts->changed_at[1] + 1 : 0,
                               .explained_to = facts->has_changed[0] ? facts->changed_at[0] - 1 : last,
                               .is_side = s->grow_dist > 0,
-                              .has_images = s->votes != NULL};
+                              .has_images = facts->view_count_max > 0};
     result.bad_count = facts->unfit_count + last - result.explained_to + result.explained_from;
     return result;
 }
@@ -469,7 +456,6 @@ static void uninit(npg_worker *worker)
     npg_skin_close(&s->skin);
     npg_cells_close(&s->cells);
     npg_carving_close(&s->empty);
-    npg_votes_close(&s->votes);
     npg_colour_cells_close(&s->colours);
 }
 
@@ -492,8 +478,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t empty = facts->sensor_count_max ? npg_carving_memory(EMPTY_MOST) : 0;
     return empty + colours + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
            npg_skin_memory(npg_worker_verts_at_most(worker), points) +
-           npg_free_space_memory(facts->view_count_max) +
-           (facts->view_count_max ? npg_votes_memory(npg_worker_verts_at_most(worker)) : 0);
+           npg_free_space_memory(facts->view_count_max);
 }
 
 extern const npg_stage npg_stage_fuse;

@@ -106,26 +106,4 @@ size_t npg_carving_find(const npg_carving *cells, float *places, int frames_leas
 /* Bytes at most. */
 size_t npg_carving_memory(size_t most);
 
-/* Votes: which vertices of the surface that is followed are contradicted by the frames' depth images.
- *
- * Of the body the images of a frame show a vertex, or something before it; where they show that nothing is
- * there, the frame was wrongly followed, or the vertex is none of the body's.  With s and e the frames that saw
- * something at the place of a vertex, and those that saw it empty, each summed over the vertex and those around
- * it, it is contradicted where e > share (s + e).  Not in the paper. */
-
-typedef struct npg_votes npg_votes;
-
-/* mesh: a counted reference is kept.  NPG_MEMORY. */
-npg_status npg_votes_open(npg_votes **votes, npg_mesh *mesh);
-void npg_votes_close(npg_votes **votes);
-
-/* Those of a frame in which the surface is where vert_unit (V x 3) says. */
-void npg_votes_cast(npg_votes *votes, const npg_free_space *space, const float *vert_unit);
-
-/* is_contradicted: V.  NPG_MEMORY. */
-npg_status npg_votes_count(const npg_votes *votes, uint8_t *is_contradicted, double share);
-
-/* Bytes at most, with what is counted out. */
-size_t npg_votes_memory(size_t vert_count);
-
 #endif

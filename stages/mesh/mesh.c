@@ -120,7 +120,6 @@ static npg_status make(making *m)
 /* The reference that was followed last, less the faces at places that were seen to be empty. */
 static npg_status keep_uncontradicted(making *m)
 {
-    const uint8_t *against = m->fused->is_contradicted;
     const npg_mesh *all = m->mesh = npg_mesh_ref(npg_worker_facts(m->worker)->reference);
     double before = npg_mesh_area(all);
     npg_pieces pieces;
@@ -128,8 +127,10 @@ static npg_status keep_uncontradicted(making *m)
     uint8_t *keep;
     NPG_TRY(npg_alloc(&keep, NPG_FOR_MESH, all->face_count));
     for (size_t f = 0; f < all->face_count; f++) {
-        const uint32_t *c = all->faces + 3 * f;
-        keep[f] = against[c[0]] + against[c[1]] + against[c[2]] < 2;
+        float middle[3] = {0, 0, 0};
+        for (size_t i = 0; i < 9; i++)
+            middle[i % 3] += all->vert_pos[3 * (size_t)all->faces[3 * f + i / 3] + i % 3] / 3;
+        keep[f] = npg_cube_set_value(m->set.empty, middle) <= NPG_MAJORITY;
     }
     npg_status status = npg_mesh_keep_faces(&m->mesh, keep);
     npg_release(&keep);
@@ -341,7 +342,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
 {
     making m = {.worker = worker, .state = npg_worker_state(worker), .key = key, .fused = fused};
     bool is_given = npg_worker_settings(worker)->reference[0];
-    bool trims = fused && fused->is_contradicted && npg_worker_facts(worker)->brief.trims_only;
+    bool trims = fused && fused->empty && npg_worker_facts(worker)->brief.trims_only;
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
     if (!status) status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);

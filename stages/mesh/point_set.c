@@ -102,6 +102,5 @@ void npg_fused_close(npg_fused **slot)
     npg_release(&(*slot)->colour_normals);
     npg_release(&(*slot)->colours);
     npg_release(&(*slot)->empty);
-    npg_release(&(*slot)->is_contradicted);
     npg_release(slot);
 }

@@ -23,12 +23,11 @@ typedef struct npg_fused {
     float *colour_points, *colour_normals;
     uint8_t *colours;
     size_t colour_count; /* M */
-    /* Cubes that sensors saw to be empty, their middles; not there where no sensor's place is known. */
+    /* Cubes near the reference that was followed which sensors saw to be empty, their middles; not there where no
+     * sensor's place is known. */
     float *empty; /* K x 3, owned, or NULL */
     size_t empty_count;
     double empty_side;
-    /* V of the reference that was followed: vertices that depth images contradict; owned, or NULL: no images. */
-    uint8_t *is_contradicted;
 } npg_fused;
 
 /* Written by stage fuse at the end of a fusing pass; stage mesh takes it in the pass that follows. */

@@ -161,6 +161,45 @@ static void frames_vote(void **state)
     close_capture(&c);
 }
 
+/* A frame of which an image shows a screen at z, as wide as it sees from (0, 0, -4) along z. */
+static void see_screen(const capture *c, float z)
+{
+    enum { WIDTH = 80 };
+    static float image[WIDTH * WIDTH];
+    static const npg_frame_box box = {.scale = 1};
+    npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4},
+                           .first = {-0.4, -0.4},
+                           .step = 0.01,
+                           .width = WIDTH,
+                           .height = WIDTH};
+    const npg_frame frame = {
+        .sensor_count = 1, .views = &view, .view_cells = image, .view_cell_count = WIDTH * WIDTH};
+    npg_seen seen = {.sensor_count = 1};
+    for (int i = 0; i < WIDTH * WIDTH; i++) image[i] = 4 + z;
+    npg_skin_pose(c->carry, c->mesh->vert_pos);
+    assert_int_equal(npg_free_space_open(&seen.space, &frame, &box), NPG_OK);
+    assert_int_equal(npg_carving_see(c->cells, c->carry, &seen), NPG_OK);
+    npg_free_space_close(&seen.space);
+}
+
+static void images_vote(void **state)
+{
+    static capture c;
+    (void)state;
+    open_capture(&c);
+    assert_int_equal(find(&c, 1, 0.2).body, 0);
+    see_screen(&c, 2); /* behind all of the ball */
+    sums all = find(&c, 1, 0.2);
+    assert_true(all.pit > 50 && all.body > 1000);
+    for (int i = 0; i < 4; i++) see_screen(&c, 0.4F);
+    assert_int_equal(find(&c, 1, 0.2).pit, all.pit); /* one of five */
+    see_screen(&c, 0.4F);
+    sums most = find(&c, 1, 0.2);
+    assert_true(most.pit < all.pit / 2);   /* one of six, where the screen is */
+    assert_true(most.body > all.body / 2); /* what lies before it is empty in all frames */
+    close_capture(&c);
+}
+
 /* A sensor without a place says nothing, and cells grow where they would be too many. */
 static void bounds_hold(void **state)
 {
@@ -209,6 +248,7 @@ int main(void)
         cmocka_unit_test(a_pit_is_seen_from_above),
         cmocka_unit_test(what_is_hidden_is_not_empty),
         cmocka_unit_test(frames_vote),
+        cmocka_unit_test(images_vote),
         cmocka_unit_test(bounds_hold),
         cmocka_unit_test(memory_that_fails_is_reported),
     };
