@@ -348,6 +348,13 @@ static npg_status begin(npg_run *run)
     return status;
 }
 
+static npg_status choose(npg_run *run)
+{
+    do NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));
+    while (run->facts.brief.compares);
+    return NPG_OK;
+}
+
 static npg_status do_passes(npg_run *run)
 {
     npg_status begun = begin(run);
@@ -357,8 +364,11 @@ static npg_status do_passes(npg_run *run)
     if (!run->facts.is_resumed) {
         NPG_TRY(do_pass(run, NPG_PASS_MEASURE));
         NPG_TRY(do_pass(run, NPG_PASS_SCORE));
-        if (run->facts.choice.count) NPG_TRY(do_pass(run, NPG_PASS_CHOOSE));
-        for (; run->facts.brief.rounds_left; run->fuse_done++) NPG_TRY(do_pass(run, NPG_PASS_FUSE));
+        if (run->facts.choice.count) NPG_TRY(choose(run));
+        for (; run->facts.brief.rounds_left; run->fuse_done++) {
+            NPG_TRY(do_pass(run, NPG_PASS_FUSE));
+            if (run->facts.brief.compares) NPG_TRY(choose(run));
+        }
     }
     run->closed_reports = json_deep_copy(json_object_get(run->report, "stages"));
     NPG_TRY(do_pass(run, NPG_PASS_SOLVE));

@@ -39,7 +39,7 @@ typedef enum npg_pass {
     NPG_PASS_MEASURE = 1, /* find count, box and sizes                */
     NPG_PASS_SCORE = 2,   /* score every frame, choose the keyframe   */
     NPG_PASS_SOLVE = 4,   /* the work itself                          */
-    NPG_PASS_CHOOSE = 8,  /* after SCORE: look closer at a few frames */
+    NPG_PASS_CHOOSE = 8,  /* after SCORE, and while brief.compares: look closer at a few frames */
     NPG_PASS_FUSE = 16    /* while facts.brief.rounds_left: all frames' points */
 } npg_pass;
 
@@ -52,6 +52,8 @@ typedef struct npg_choice {
     bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
     int64_t ranked[NPG_CHOICE_MAX];       /* keyframes to try where the one chosen fails, the best first */
     size_t ranked_count;
+    bool
+        is_tried; /* the key alone is read: others are compared if its first pass says that one could do better */
 } npg_choice;
 
 /* Whether the frame with this index is one of the candidates. */
@@ -68,6 +70,7 @@ typedef struct npg_brief {
     int64_t
         rounds_left; /* fusing passes that are still to be walked: each follows the reference so far through
                                all frames and gathers their points for the next one */
+    bool compares;   /* a choosing pass compares candidates first: another may do better than the key tried */
     int64_t key;     /* index of the keyframe; negative: as planned */
     bool is_attempt; /* ... of which it is to be seen whether it does better than the one before */
     bool takes_gathered; /* the next reference is made from what was gathered ...   */
@@ -112,9 +115,10 @@ typedef struct npg_facts {
     int64_t
         unreached_count; /* frames that see too much that the reference does not have, and those beyond them */
     /* mesh */
-    npg_mesh *reference; /* unit coordinates, with normals; owned by the run; made anew in each fusing pass
+    npg_mesh *reference;   /* unit coordinates, with normals; owned by the run; made anew in each fusing pass
                             and in the solving one, before the first frame is passed on */
-    double unseen_share; /* share of the reference's area that no point of its frame saw */
+    int64_t reference_key; /* index of the frame that it is made around */
+    double unseen_share;   /* share of the reference's area that no point of its frame saw */
     /* evaluate, at the end of a fusing pass and of the solving one; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */

@@ -24,6 +24,7 @@
 #include "pipeline/options.h"
 #include "pipeline/order.h"
 #include "reference/loop.h"
+#include "reference/reference.h"
 #include "track/track.h"
 
 /* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
@@ -68,6 +69,7 @@ typedef struct state {
     double spacing, noise;     /* of the keyframe's points */
     double usual;              /* mean of the frames' median distances */
     int64_t frames, misaligned, points, strays;
+    npg_judging *judging; /* of the keyframe that is tried; NULL: it stays in any case */
     double grow_dist; /* of an open reference that sensors saw: so near its border points add to it; else 0 */
 } state;
 
@@ -213,6 +215,23 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     return NPG_OK;
 }
 
+/* How the reference of a keyframe that is tried fares in a frame of the sample, its own first. */
+static npg_status judge(npg_worker *worker, int64_t index, const float *vert_unit)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
+    npg_judge_settings settings = {0};
+    size_t at = clouds ? npg_candidate_clouds_find(clouds, index) : 0;
+    if (!facts->choice.is_tried || !clouds || at == clouds->count) return NPG_OK;
+    const npg_candidate_cloud *seen = &clouds->list[at];
+    if (index == facts->plan.key) {
+        NPG_TRY(npg_cloud_spacing(&settings.spacing_unit, seen->points, seen->point_count));
+        NPG_TRY(npg_judging_open(&s->judging, clouds, at, facts->reference, &settings));
+    }
+    return s->judging ? npg_judging_see(s->judging, seen, vert_unit) : NPG_OK;
+}
+
 static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
@@ -221,6 +240,7 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     if (!s->skin) NPG_TRY(open_gathering(worker, c));
     if (c->colours && !s->colours)
         NPG_TRY(npg_colour_cells_open(&s->colours, COLOUR_SIDE * s->spacing, COLOURS_MOST));
+    NPG_TRY(judge(worker, frame->index, frame->vert_unit));
     npg_skin_pose(s->skin, frame->vert_unit);
     NPG_TRY(npg_skin_to_rest(s->skin, c->warped, c->points, c->normals, c->count));
     NPG_TRY(median_dist(&median, c, s->grow_dist > 0));
@@ -350,7 +370,7 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
             s->usable += !frame->is_skipped;
             if (frame->sensor_count > s->sensors) s->sensors = frame->sensor_count;
             if (frame->views && frame->sensor_count > s->views) s->views = frame->sensor_count;
-        } else {
+        } else if (npg_worker_pass(worker) == NPG_PASS_FUSE) {
             NPG_TRY(gather_frame(worker, frame));
         }
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
@@ -373,6 +393,22 @@ static npg_status begin(npg_worker *worker)
     *npg_own(worker, brief) = npg_reference_begin(loop, s->usable > 1 ? s->rounds : 0);
     *npg_own(worker, sensor_count_max) = s->sensors;
     *npg_own(worker, view_count_max) = s->views;
+    return NPG_OK;
+}
+
+/* Whether another keyframe could do better than the one that is tried: parts that touch in it are joined, or points
+ * are farther from its surface than their own would be. */
+static npg_status is_beatable(bool *beatable, npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    int64_t handles;
+    *beatable = false;
+    if (!s->judging) return NPG_OK;
+    const npg_judgement *found = npg_judging_found(s->judging);
+    NPG_TRY(npg_mesh_handles(&handles, npg_worker_facts(worker)->reference));
+    *beatable = handles > 0 || !npg_judged_least(found);
+    json_object_update_new(npg_worker_report(worker),
+                           json_pack("{sf sf}", "judged", found->mean, "judged_own", found->own));
     return NPG_OK;
 }
 
@@ -427,23 +463,46 @@ static void tell(npg_worker *worker, const npg_reference_loop *loop, const npg_p
                        brief->is_growing ? ": it grows, and they are followed again" : "");
 }
 
+static void offer(const npg_worker *worker, npg_reference_loop *loop)
+{
+    const state *s = npg_worker_state(worker);
+    const npg_choice *choice = &npg_worker_facts(worker)->choice;
+    size_t most = (size_t)s->attempts;
+    npg_reference_offer(loop, choice->ranked, choice->ranked_count < most ? choice->ranked_count : most);
+}
+
+/* The keyframe's surface is there, or candidates were compared. */
+static npg_status settle_choice(npg_worker *worker, npg_reference_loop *loop)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    bool beatable, was_open = !loop->is_settled;
+    if (loop->brief.compares) {
+        offer(worker, loop);
+        *npg_own(worker, brief) = npg_reference_compared(loop, facts->plan.key);
+        if (loop->tried_count) tell(worker, loop, &loop->trial, was_open);
+        return NPG_OK;
+    }
+    if (facts->reference) NPG_TRY(judge(worker, facts->plan.key, facts->reference->vert_pos));
+    NPG_TRY(is_beatable(&beatable, worker));
+    if (beatable) *npg_own(worker, brief) = npg_reference_doubt(loop);
+    return NPG_OK;
+}
+
 /* The pass's points are gathered as what comes next needs them; what was gathered for a keyframe that does better
  * stays. */
 static npg_status settle(npg_worker *worker)
 {
-    const state *s = npg_worker_state(worker);
-    const npg_choice *choice = &npg_worker_facts(worker)->choice;
     npg_reference_loop *loop = npg_worker_kept(worker);
     if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return begin(worker);
+    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE) return settle_choice(worker, loop);
     npg_fused *before = npg_worker_take_fact(worker, &npg_fact_fused);
     bool was_open = !loop->is_settled;
-    if (!loop->tried_count)
-        npg_reference_offer(loop, choice->ranked,
-                            choice->ranked_count < (size_t)s->attempts ? choice->ranked_count
-                                                                       : (size_t)s->attempts);
-    const npg_pass_result result = result_of(worker);
+    if (!loop->tried_count) offer(worker, loop);
+    npg_pass_result result = result_of(worker);
+    NPG_TRY(is_beatable(&result.is_beatable, worker));
+    result.is_beatable |= result.bad_count && npg_worker_facts(worker)->choice.is_tried;
     *npg_own(worker, brief) = npg_reference_next(loop, &result);
-    tell(worker, loop, &result, was_open);
+    if (loop->tried_count) tell(worker, loop, &result, was_open);
     if (before && was_open && !npg_reference_keeps_last(loop))
         return npg_worker_publish(worker, &npg_fact_fused, before);
     npg_fused_close(&before);
@@ -454,6 +513,7 @@ static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     npg_skin_close(&s->skin);
+    npg_judging_close(&s->judging);
     npg_cells_close(&s->cells);
     npg_carving_close(&s->empty);
     npg_colour_cells_close(&s->colours);
@@ -486,7 +546,7 @@ const npg_stage npg_stage_fuse = {.name = "fuse",
                                   .help = "gathers the points of all frames for the reference",
                                   .options = options,
                                   .state_size = sizeof(state),
-                                  .passes = NPG_PASS_MEASURE | NPG_PASS_FUSE,
+                                  .passes = NPG_PASS_MEASURE | NPG_PASS_CHOOSE | NPG_PASS_FUSE,
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE,
                                   .takes_part = takes_part,
                                   .process = process,

@@ -197,7 +197,8 @@ npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, np
 {
     if (!pass->clouds) NPG_TRY(npg_candidate_clouds_open(&pass->clouds));
     for (size_t i = 0; i < npg_chunk_count(chunk); i++) {
-        const npg_frame *frame = npg_chunk_frame(chunk, i);
+        npg_frame *frame = npg_chunk_frame(chunk, i);
+        frame->is_key = facts->choice.is_tried && frame->index == facts->plan.key;
         NPG_TRY(npg_candidate_clouds_add(pass->clouds, frame, &facts->box,
                                          npg_choice_is_candidate(&facts->choice, frame->index)));
     }
@@ -247,6 +248,8 @@ npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, bool i
     else if (is_open)
         spread_candidates(npg_own(worker, choice), clouds, npg_worker_facts(worker)->plan.key);
     pass->clouds = NULL; /* the run's, from here on */
+    npg_candidate_clouds *before = npg_worker_take_fact(worker, &npg_fact_candidate_clouds);
+    npg_candidate_clouds_close(&before);
     return npg_worker_publish(worker, &npg_fact_candidate_clouds, clouds);
 }
 

@@ -294,8 +294,11 @@ static void set_choice(npg_worker *worker)
     const keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     bool chooses = has_candidates(worker) && !goes_by_area(worker);
+    /* A pass that follows one side of the body says little of what other frames see. */
+    bool is_tried = chooses && facts->brief.rounds_left && !facts->sensor_count_max;
     if (facts->planned_count < 2 || *own_mesh(worker) || state->choice == CHOICE_PAPER) return;
-    npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count, !chooses);
+    npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count, !chooses || is_tried);
+    npg_own(worker, choice)->is_tried = is_tried;
 }
 
 static void report_key(npg_worker *worker, const candidate *key)
@@ -360,6 +363,8 @@ static npg_status settle(npg_worker *worker)
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
     int64_t key = facts->brief.key;
+    if (facts->brief.compares)
+        npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count, false);
     if (npg_worker_pass(worker) != NPG_PASS_FUSE || key < 0 || key == facts->plan.key) return NPG_OK;
     int64_t number = clouds->list[npg_candidate_clouds_find(clouds, key)].number;
     npg_own(worker, plan)->key = key;
@@ -509,7 +514,7 @@ static const npg_option options[] = {
 static double expects(const npg_worker *worker, npg_pass pass)
 {
     const npg_facts *facts = npg_worker_facts(worker);
-    if (pass != NPG_PASS_CHOOSE || !facts->choice.count) return 0;
+    if (pass != NPG_PASS_CHOOSE || facts->choice.candidate_count < 2) return 0;
     return npg_cost_choice_s((double)facts->point_count_max, facts->has_normals);
 }
 

@@ -297,20 +297,35 @@ static npg_status close_over(making *m)
 
 /* ---- keep it, or take it back ---- */
 
-/* Judge the new reference and the one before it by what held-out points of the sampled frames say. */
+/* Where the one before left nothing to explain in any frame, points are where they belong, and what was gathered of
+ * them shows in the keyframe what it is worth. */
+static npg_status judge_reference(npg_judgement *judgement, const npg_candidate_clouds *clouds, size_t at,
+                                  npg_mesh *mesh, const npg_judge_settings *settings, bool in_key_alone)
+{
+    npg_judging *judging;
+    if (!in_key_alone) return npg_judge(judgement, clouds, at, mesh, settings);
+    NPG_TRY(npg_judging_open(&judging, clouds, at, mesh, settings));
+    npg_status status = npg_judging_see(judging, &clouds->list[at], mesh->vert_pos);
+    *judgement = *npg_judging_found(judging);
+    npg_judging_close(&judging);
+    return status;
+}
+
+/* Judge the new reference and the one before it by what points of the sampled frames say. */
 static npg_status compare(bool *is_worse, making *m, const npg_candidate_clouds *clouds, npg_mesh *before)
 {
     npg_judgement now, then;
     npg_judge_settings settings = {.should_stop = npg_worker_should_stop, .user = m->worker};
     size_t at = npg_candidate_clouds_find(clouds, m->key->index);
+    bool is_explained = npg_worker_facts(m->worker)->choice.is_tried;
     *is_worse = false;
     if (at == clouds->count) return NPG_OK;
     NPG_TRY(npg_cloud_spacing(&settings.spacing_unit, clouds->list[at].points, clouds->list[at].point_count));
-    NPG_TRY(npg_judge(&then, clouds, at, before, &settings));
-    NPG_TRY(npg_judge(&now, clouds, at, m->mesh, &settings));
+    NPG_TRY(judge_reference(&then, clouds, at, before, &settings, is_explained));
+    NPG_TRY(judge_reference(&now, clouds, at, m->mesh, &settings, is_explained));
     npg_mesh_note(m->worker, "judged", now.mean);
     npg_mesh_note(m->worker, "judged_before", then.mean);
-    *is_worse = npg_judged_better(&then, &now);
+    *is_worse = is_explained ? npg_judged_clearly(&then, &now) : npg_judged_better(&then, &now);
     return NPG_OK;
 }
 
@@ -356,6 +371,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     if (status) npg_mesh_unref(&m.mesh);
     npg_mesh_unref(npg_own(worker, reference));
     *npg_own(worker, reference) = m.mesh;
+    *npg_own(worker, reference_key) = key->index;
     if (!status) npg_worker_close_report(worker);
     return npg_error_prefix(status, "keyframe %lld (%s)", (long long)key->number,
                             key->path ? key->path : "pushed");
@@ -381,7 +397,11 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     const mesh_state *s = npg_worker_state(worker);
-    bool is_there = s->is_made || facts->is_resumed;
+    npg_pass pass = npg_worker_pass(worker);
+    bool is_tried =
+        pass == NPG_PASS_FUSE && facts->choice.is_tried && facts->reference_key == facts->plan.key;
+    bool is_there =
+        s->is_made || facts->is_resumed || (is_tried && !npg_worker_fact(worker, &npg_fact_fused));
     for (size_t i = 0; i < npg_chunk_count(*chunk) && !is_there; i++) {
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (!frame->is_key) continue;
@@ -389,7 +409,8 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
         npg_worker_step(worker, 1, 1, 1);
         is_there = true;
     }
-    if (!is_there) return npg_error(NPG_FAILED, "the keyframe does not come first");
+    if (!is_there && pass != NPG_PASS_CHOOSE)
+        return npg_error(NPG_FAILED, "the keyframe does not come first");
     return NPG_OK;
 }
 
@@ -434,7 +455,7 @@ const npg_stage npg_stage_mesh = {.name = "mesh",
                                   .help = "Reference surface of the keyframe",
                                   .options = mesh_options,
                                   .state_size = sizeof(mesh_state),
-                                  .passes = NPG_PASS_FUSE | NPG_PASS_SOLVE,
+                                  .passes = NPG_PASS_CHOOSE | NPG_PASS_FUSE | NPG_PASS_SOLVE,
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY,
                                   .gives = NPG_FIELD_REFERENCE,
                                   .process = mesh_process,

@@ -13,12 +13,13 @@
 static const npg_tracker_settings judge_tracking = {
     .nodes = 150, .samples = 800, .steps = 8, .stiffness = 0.01, .along = 0.1};
 
-typedef struct judging {
-    const npg_judge_settings *settings;
-    const npg_candidate_clouds *clouds;
-    const npg_mesh *mesh;
-    npg_judgement *judgement;
+struct npg_judging {
     npg_arena arena;
+    npg_judge_settings settings;
+    const npg_candidate_clouds *clouds;
+    const npg_candidate_cloud *own; /* the frame that the surface was made from */
+    const npg_mesh *mesh;
+    npg_judgement judgement;
     double tau_sq;
     npg_surface *surface;
     float *normals;   /* V x 3: of the posed surface                    */
@@ -27,16 +28,16 @@ typedef struct judging {
     uint32_t *near;   /* V */
     uint8_t *is_seen; /* V */
     npg_visible visible;
-} judging;
+};
 
-static double rho(const judging *j, double dist_sq)
+static double rho(const npg_judging *j, double dist_sq)
 {
     return fmin(dist_sq, j->tau_sq) / j->tau_sq;
 }
 
 /* ---- both directions ---- */
 
-static npg_status points_off(double *mean, const judging *j, const npg_candidate_cloud *cloud)
+static npg_status points_off(double *mean, const npg_judging *j, const npg_candidate_cloud *cloud)
 {
     npg_arena scratch = {.purpose = NPG_FOR_FIT};
     npg_surface_hit *hits = npg_arena_take(&scratch, cloud->held_count, sizeof *hits);
@@ -50,7 +51,7 @@ static npg_status points_off(double *mean, const judging *j, const npg_candidate
 }
 
 /* Towards the sensor from far enough before a held-out point that its own surface is behind. */
-static void aim_at(npg_ray *ray, const judging *j, const float sensor[3], const float point[3])
+static void aim_at(npg_ray *ray, const npg_judging *j, const float sensor[3], const float point[3])
 {
     double length = 0;
     for (int a = 0; a < 3; a++) {
@@ -63,7 +64,7 @@ static void aim_at(npg_ray *ray, const judging *j, const float sensor[3], const 
 }
 
 /* Some sensor saw each point: no surface stands between it and all of them. */
-static npg_status points_behind(double *share, const judging *j, const npg_candidate_cloud *cloud)
+static npg_status points_behind(double *share, const npg_judging *j, const npg_candidate_cloud *cloud)
 {
     npg_arena scratch = {.purpose = NPG_FOR_FIT};
     size_t n = cloud->held_count, behind = 0;
@@ -88,7 +89,7 @@ static npg_status points_behind(double *share, const judging *j, const npg_candi
     return status;
 }
 
-static void spread_areas(const judging *j, const float *vert_unit)
+static void spread_areas(const npg_judging *j, const float *vert_unit)
 {
     for (size_t v = 0; v < j->mesh->vert_count; v++) j->areas[v] = 0;
     for (size_t f = 0; f < j->mesh->face_count; f++) {
@@ -99,7 +100,8 @@ static void spread_areas(const judging *j, const float *vert_unit)
 }
 
 /* Of the points that a sensor would have of a place, for its area: what it sees aslant it has few of. */
-static double expected(const judging *j, const npg_candidate_cloud *cloud, const float *vert_unit, size_t v)
+static double expected(const npg_judging *j, const npg_candidate_cloud *cloud, const float *vert_unit,
+                       size_t v)
 {
     double most = 0;
     if (!j->is_seen[v]) return 0;
@@ -116,12 +118,12 @@ static double expected(const judging *j, const npg_candidate_cloud *cloud, const
     return most;
 }
 
-/* To all points, those that were held out among them: fewer would leave gaps. */
-static npg_status surface_off(double *mean, judging *j, const npg_candidate_cloud *cloud,
+/* To all points, those that were held out among them: fewer would leave gaps.  *seen: of what has points alone. */
+static npg_status surface_off(double *mean, double *seen, npg_judging *j, const npg_candidate_cloud *cloud,
                               const float *vert_unit)
 {
     size_t v = j->mesh->vert_count;
-    double sum = 0, area = 0;
+    double sum = 0, area = 0, seen_sum = 0, seen_area = 0;
     spread_areas(j, vert_unit);
     npg_mesh_vertex_normals(j->normals, vert_unit, v, j->mesh->faces, j->mesh->face_count);
     NPG_TRY(npg_visible_find(&j->visible, j->is_seen, j->surface, cloud->sensors, cloud->sensor_count,
@@ -130,25 +132,30 @@ static npg_status surface_off(double *mean, judging *j, const npg_candidate_clou
     for (size_t i = 0; i < v; i++) {
         bool is_nowhere = npg_free_space_is_empty(cloud->space, vert_unit + 3 * i);
         double weight = j->areas[i] * (is_nowhere ? 1 : expected(j, cloud, vert_unit, i));
-        sum += weight * (is_nowhere ? 1 : rho(j, (double)j->dist_sq[i]));
+        double off = weight * (is_nowhere ? 1 : rho(j, (double)j->dist_sq[i]));
+        sum += off;
         area += weight;
+        if (off < weight) seen_sum += off;
+        if (off < weight) seen_area += weight;
     }
+    *seen = seen_area > 0 ? seen_sum / seen_area : 0;
     *mean = area > 0 ? sum / area : 1;
     return NPG_OK;
 }
 
-static npg_status judge_frame(void *user, const npg_candidate_cloud *cloud, const float *vert_unit)
+npg_status npg_judging_see(void *user, const npg_candidate_cloud *cloud, const float *vert_unit)
 {
-    judging *j = user;
-    npg_judgement *out = j->judgement;
-    double points, surface, behind;
-    if (j->settings->should_stop && j->settings->should_stop(j->settings->user))
+    npg_judging *j = user;
+    npg_judgement *out = &j->judgement;
+    double points, surface, seen, behind;
+    if (j->settings.should_stop && j->settings.should_stop(j->settings.user))
         return npg_error(NPG_STOPPED, "stopped while a reference was judged");
     NPG_TRY(npg_surface_move(j->surface, vert_unit));
     NPG_TRY(points_off(&points, j, cloud));
-    NPG_TRY(surface_off(&surface, j, cloud, vert_unit));
+    NPG_TRY(surface_off(&surface, &seen, j, cloud, vert_unit));
     NPG_TRY(points_behind(&behind, j, cloud));
     double figure = points + surface + behind;
+    if (cloud == j->own) out->own = points + seen + behind;
     out->of_frame[cloud - j->clouds->list] = figure;
     out->mean += (figure - out->mean) / (double)++out->count;
     return NPG_OK;
@@ -156,11 +163,9 @@ static npg_status judge_frame(void *user, const npg_candidate_cloud *cloud, cons
 
 /* ---- the whole ---- */
 
-static npg_status open_judging(judging *j)
+static npg_status open_arrays(npg_judging *j)
 {
     size_t v = j->mesh->vert_count;
-    j->tau_sq = TAU * TAU * j->settings->spacing_unit * j->settings->spacing_unit;
-    j->arena.purpose = NPG_FOR_FIT;
     j->normals = npg_arena_take(&j->arena, v, 3 * sizeof *j->normals);
     j->areas = npg_arena_take(&j->arena, v, sizeof *j->areas);
     j->dist_sq = npg_arena_take(&j->arena, v, sizeof *j->dist_sq);
@@ -171,16 +176,42 @@ static npg_status open_judging(judging *j)
     return npg_surface_open(&j->surface, j->mesh->vert_pos, v, j->mesh->faces, j->mesh->face_count);
 }
 
+npg_status npg_judging_open(npg_judging **out, const npg_candidate_clouds *clouds, size_t at,
+                            const npg_mesh *mesh, const npg_judge_settings *settings)
+{
+    NPG_TRY(npg_object_open(out, NPG_FOR_FIT, sizeof **out));
+    npg_judging *j = *out;
+    j->settings = *settings;
+    j->clouds = clouds;
+    j->own = &clouds->list[at];
+    j->mesh = mesh;
+    j->tau_sq = TAU * TAU * settings->spacing_unit * settings->spacing_unit;
+    for (size_t i = 0; i < NPG_CHOICE_FRAMES; i++) j->judgement.of_frame[i] = (double)NAN;
+    npg_status status = open_arrays(j);
+    if (status) npg_judging_close(out);
+    return status;
+}
+
+void npg_judging_close(npg_judging **slot)
+{
+    if (!*slot) return;
+    npg_surface_close(&(*slot)->surface);
+    npg_object_close(slot);
+}
+
+const npg_judgement *npg_judging_found(const npg_judging *judging)
+{
+    return &judging->judgement;
+}
+
 npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *clouds, size_t at, npg_mesh *mesh,
                      const npg_judge_settings *settings)
 {
-    judging j = {.settings = settings, .clouds = clouds, .mesh = mesh, .judgement = judgement};
-    *judgement = (npg_judgement){0};
-    for (size_t i = 0; i < NPG_CHOICE_FRAMES; i++) judgement->of_frame[i] = (double)NAN;
-    npg_status status = open_judging(&j);
-    if (!status) status = npg_candidate_follow(clouds, at, mesh, &judge_tracking, judge_frame, &j);
-    npg_surface_close(&j.surface);
-    npg_arena_release(&j.arena);
+    npg_judging *j;
+    NPG_TRY(npg_judging_open(&j, clouds, at, mesh, settings));
+    npg_status status = npg_candidate_follow(clouds, at, mesh, &judge_tracking, npg_judging_see, j);
+    *judgement = j->judgement;
+    npg_judging_close(&j);
     return status;
 }
 
@@ -202,6 +233,11 @@ double npg_judged_against(const npg_judgement *one, const npg_judgement *other)
 bool npg_judged_clearly(const npg_judgement *one, const npg_judgement *other)
 {
     return one->mean < CLEARLY * other->mean;
+}
+
+bool npg_judged_least(const npg_judgement *one)
+{
+    return !(one->own < CLEARLY * one->mean);
 }
 
 bool npg_judged_better(const npg_judgement *one, const npg_judgement *other)

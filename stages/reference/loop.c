@@ -39,6 +39,7 @@ static void grow(npg_reference_loop *loop, int64_t unreached)
 
 void npg_reference_offer(npg_reference_loop *loop, const int64_t *keys, size_t count)
 {
+    loop->other_count = 0;
     for (size_t i = 0; i < count && loop->other_count < NPG_ATTEMPTS_MOST; i++)
         loop->others[loop->other_count++] = keys[i];
 }
@@ -81,6 +82,11 @@ static const npg_pass_result *settle_key(npg_reference_loop *loop)
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result)
 {
     npg_brief *brief = &loop->brief;
+    if (result->is_beatable && !loop->is_compared) {
+        loop->trial = *result;
+        brief->compares = true;
+        return *brief;
+    }
     brief->takes_poses = true;
     if (tries_another(loop, result)) return *brief;
     if (!loop->is_settled) result = settle_key(loop);
@@ -105,4 +111,20 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
         brief->rounds_left++;
     }
     return *brief;
+}
+
+npg_brief npg_reference_doubt(npg_reference_loop *loop)
+{
+    loop->trial.key = -1;
+    loop->brief.compares = true;
+    return loop->brief;
+}
+
+npg_brief npg_reference_compared(npg_reference_loop *loop, int64_t key)
+{
+    loop->is_compared = true;
+    loop->brief.compares = false;
+    if (key == loop->trial.key) return npg_reference_next(loop, &loop->trial);
+    loop->brief.takes_gathered = loop->brief.takes_poses = false;
+    return loop->brief;
 }

@@ -20,8 +20,9 @@ typedef struct npg_pass_result {
     int64_t unreached_count; /* frames that see too much that the reference does not have, and those beyond */
     bool has_changed;        /* it does not explain the capture to both its ends ...    */
     int64_t explained_from, explained_to; /* ... but from and to the frames of these indices */
-    bool is_side;    /* it is a side of the body: what it lacks says nothing of how that is joined */
-    bool has_images; /* frames can contradict it */
+    bool is_side;     /* it is a side of the body: what it lacks says nothing of how that is joined */
+    bool has_images;  /* frames can contradict it */
+    bool is_beatable; /* another keyframe's reference could do better */
 } npg_pass_result;
 
 #define NPG_ATTEMPTS_MOST NPG_CHOICE_MAX
@@ -34,6 +35,8 @@ typedef struct npg_reference_loop {
     int64_t others[NPG_ATTEMPTS_MOST];            /* that may be tried, the best first ... */
     size_t other_count;                           /* ... the i-th as the (i + 1)-th of all */
     bool is_settled;                              /* the keyframe is no longer in question */
+    bool is_compared;                             /* it was chosen among candidates ...    */
+    npg_pass_result trial;                        /* ... after the pass that came to this  */
     int64_t unreached_before;                     /* of the pass before ...                             */
     int64_t in_vain;                              /* ... and passes in a row that reached no more since */
     bool is_last_look;                            /* the pass to come is walked for what it contradicts */
@@ -44,7 +47,7 @@ typedef struct npg_reference_loop {
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds);
 
 /* Keyframes (count indices, the best first) that are tried, while frames fail, as long as the first pass has not
- * ended. */
+ * ended; they replace those of before. */
 void npg_reference_offer(npg_reference_loop *loop, const int64_t *keys, size_t count);
 
 /* Whether the keyframe of the pass that ended last is the best so far: what was gathered for it is kept, and what
@@ -58,5 +61,12 @@ bool npg_reference_keeps_last(const npg_reference_loop *loop);
  * a side that reaches all, is gathered once more: the last frames that were reached had nothing around them
  * yet, and what others see through there shows when it is followed. */
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result);
+
+/* The brief where another keyframe could do better before any pass has shown it. */
+npg_brief npg_reference_doubt(npg_reference_loop *loop);
+
+/* The brief after candidates were compared, where the one before asked for it: `key` is the best.  Another than was
+ * tried is followed from the beginning; of the same all goes on. */
+npg_brief npg_reference_compared(npg_reference_loop *loop, int64_t key);
 
 #endif

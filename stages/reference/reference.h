@@ -19,8 +19,10 @@
  * in space that was seen to be empty; points of what the surface lacks lie off the surface. */
 
 typedef struct npg_judgement {
-    size_t count;                       /* frames judged */
-    double mean;                        /* of D_t, over these */
+    size_t count; /* frames judged */
+    double mean;  /* of D_t, over these */
+    double
+        own; /* D_t in the frame that the surface was made from, where that was seen: of what has points there */
     double of_frame[NPG_CHOICE_FRAMES]; /* D_t by place in the sample, NAN: it was not judged */
 } npg_judgement;
 
@@ -35,12 +37,26 @@ typedef struct npg_judge_settings {
 npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *clouds, size_t at, npg_mesh *mesh,
                      const npg_judge_settings *settings);
 
+/* The same of a surface that somebody else follows: npg_judging_see() is told where it is in each sampled frame,
+ * its own among them (judging: an npg_judging; vert_unit: V x 3).  Clouds and mesh are loans.
+ * NPG_MEMORY, NPG_STOPPED. */
+typedef struct npg_judging npg_judging;
+npg_status npg_judging_open(npg_judging **judging, const npg_candidate_clouds *clouds, size_t at,
+                            const npg_mesh *mesh, const npg_judge_settings *settings);
+npg_status npg_judging_see(void *judging, const npg_candidate_cloud *cloud, const float *vert_unit);
+const npg_judgement *npg_judging_found(const npg_judging *judging); /* so far; a loan */
+void npg_judging_close(npg_judging **judging);
+
 /* The mean of D_t(one) - D_t(other) over the frames in which both were judged, in standard errors of that
  * mean: negative, `one` is better.  0 where fewer than three are in common. */
 double npg_judged_against(const npg_judgement *one, const npg_judgement *other);
 
 /* Whether the figure of `one` is better by so much that it is no matter of how coarsely a surface is followed. */
 bool npg_judged_clearly(const npg_judgement *one, const npg_judgement *other);
+
+/* Whether no other could be better so clearly: what points say of a surface in the frame that it was made from is
+ * the least that they say of any in any frame, as it comes of how densely that was sampled. */
+bool npg_judged_least(const npg_judgement *one);
 
 /* Whether it is, beyond chance, too: by two standard errors. */
 bool npg_judged_better(const npg_judgement *one, const npg_judgement *other);

@@ -106,6 +106,43 @@ static void the_surface_that_fits_is_better(void **state)
     npg_candidate_clouds_close(&clouds);
 }
 
+/* Where it is told the surface to be, a step along x to each frame, and `off` steps more. */
+static npg_judgement told(const npg_candidate_clouds *clouds, const npg_mesh *mesh, float off)
+{
+    const npg_judge_settings settings = {.spacing_unit = 0.06};
+    npg_mesh *posed = ball_of(1);
+    npg_judging *judging;
+    assert_int_equal(npg_judging_open(&judging, clouds, 0, mesh, &settings), NPG_OK);
+    for (size_t f = 0; f < clouds->count; f++) {
+        for (size_t i = 0; i < 3 * mesh->vert_count; i++)
+            posed->vert_pos[i] = mesh->vert_pos[i] + (i % 3 || !f ? 0 : STEP * ((float)f + off));
+        assert_int_equal(npg_judging_see(judging, &clouds->list[f], posed->vert_pos), NPG_OK);
+    }
+    npg_judgement found = *npg_judging_found(judging);
+    npg_judging_close(&judging);
+    npg_mesh_unref(&posed);
+    return found;
+}
+
+static void what_is_as_near_as_in_its_own_frame_can_not_be_beaten(void **state)
+{
+    (void)state;
+    npg_candidate_clouds *clouds = sample(false);
+    npg_mesh *right = ball_of(1), *wrong = ball_of(1.6f);
+    const npg_judgement near = told(clouds, right, 0), far = told(clouds, right, 2),
+                        of_wrong = told(clouds, wrong, 0);
+    assert_int_equal(near.count, FRAMES);
+    assert_true(near.own > 0 && near.own == far.own); /* its own frame is where it is */
+    assert_true(npg_judged_least(&near));
+    assert_false(npg_judged_least(&far));
+    assert_true(of_wrong.own <
+                of_wrong.of_frame[0]); /* what has no point there says nothing of what another has */
+    assert_false(npg_judged_least(&of_wrong));
+    npg_mesh_unref(&right);
+    npg_mesh_unref(&wrong);
+    npg_candidate_clouds_close(&clouds);
+}
+
 static void what_no_sensor_sees_needs_no_points(void **state)
 {
     (void)state;
@@ -153,6 +190,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(held_out_points_are_no_others),
         cmocka_unit_test(the_surface_that_fits_is_better),
+        cmocka_unit_test(what_is_as_near_as_in_its_own_frame_can_not_be_beaten),
         cmocka_unit_test(what_no_sensor_sees_needs_no_points),
         cmocka_unit_test(it_stops_and_says_where_memory_ends),
     };

@@ -183,6 +183,54 @@ static void a_keyframe_that_fails_gives_way_to_a_better_one(void **state)
     assert_int_equal(brief.rounds_left, 0);
 }
 
+static npg_brief try_of(npg_reference_loop *loop, int64_t key, bool is_beatable)
+{
+    const npg_pass_result result = {.key = key, .explained_to = 20, .is_beatable = is_beatable};
+    return npg_reference_next(loop, &result);
+}
+
+static void a_keyframe_that_none_can_beat_is_compared_with_none(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 1);
+    npg_brief brief = try_of(&loop, 5, false);
+    assert_false(brief.compares);
+    assert_true(brief.takes_gathered && brief.takes_poses);
+    assert_int_equal(brief.rounds_left, 0);
+}
+
+static void the_pass_of_a_keyframe_that_stays_counts(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 1);
+    npg_brief brief = try_of(&loop, 5, true);
+    assert_true(brief.compares);
+    brief = npg_reference_compared(&loop, 5);
+    assert_false(brief.compares);
+    assert_true(brief.takes_gathered && brief.takes_poses);
+    assert_int_equal(brief.rounds_left, 0);
+}
+
+static void a_keyframe_that_is_beaten_is_followed_no_further(void **state)
+{
+    (void)state;
+    for (int with_pass = 0; with_pass < 2; with_pass++) {
+        npg_reference_loop loop;
+        npg_reference_begin(&loop, 1);
+        npg_brief brief = with_pass ? try_of(&loop, 5, true) : npg_reference_doubt(&loop);
+        assert_true(brief.compares);
+        brief = npg_reference_compared(&loop, 8);
+        assert_false(brief.compares || brief.takes_gathered || brief.takes_poses);
+        assert_int_equal(brief.rounds_left, 1);
+        brief = try_of(&loop, 8, true); /* candidates are compared once */
+        assert_false(brief.compares);
+        assert_true(brief.takes_gathered && brief.takes_poses);
+        assert_int_equal(brief.rounds_left, 0);
+    }
+}
+
 static void a_keyframe_that_does_no_better_is_taken_back(void **state)
 {
     (void)state;
@@ -232,6 +280,9 @@ int main(void)
         cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),
         cmocka_unit_test(growth_never_goes_on_for_ever),
         cmocka_unit_test(a_keyframe_that_fails_gives_way_to_a_better_one),
+        cmocka_unit_test(a_keyframe_that_none_can_beat_is_compared_with_none),
+        cmocka_unit_test(the_pass_of_a_keyframe_that_stays_counts),
+        cmocka_unit_test(a_keyframe_that_is_beaten_is_followed_no_further),
         cmocka_unit_test(a_keyframe_that_does_no_better_is_taken_back),
         cmocka_unit_test(no_other_keyframe_is_tried_without_need),
     };
