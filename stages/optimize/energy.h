@@ -148,6 +148,14 @@ typedef struct npg_energy_system {
     float *right;  /* T x W x 3: r                                     */
 } npg_energy_system;
 
+/* diagonal (W, every `stride`-th of its floats) = that of A in frame t, but for the motion's part. */
+void npg_energy_diagonal(float *diagonal, size_t stride, const npg_energy_system *system, size_t t);
+
+/* The factored band of one vertex in time: the motion of vertex v, and on its main diagonal that of its T
+ * frames (every `stride`-th of `diagonal`).  band: room for T rows. */
+void npg_energy_band(npg_band *band, const npg_energy_system *system, size_t v, const float *diagonal,
+                     size_t stride);
+
 /* image_t = the rows of A d that belong to frame t; d and image: T x W x 3. */
 void npg_energy_multiply(float *image, const npg_energy_system *system, const float *d, size_t t);
 

@@ -29,6 +29,29 @@ void npg_energy_bend(float *image, const npg_energy_system *s, const float *x, s
     }
 }
 
+void npg_energy_diagonal(float *diagonal, size_t stride, const npg_energy_system *s, size_t t)
+{
+    for (size_t v = 0; v < s->vert_count; v++)
+        diagonal[stride * v] = (float)s->shape * (float)(s->ring.start[v + 1] - s->ring.start[v]) +
+                               s->shares[t] * s->ties[v] + 1e-6f;
+    for (size_t i = 0; i < s->pull_counts[t]; i++) {
+        const npg_point_pull *p = &s->pulls[t * s->most + i];
+        for (size_t c = 0; c < 3; c++) /* a third: the mean over the directions */
+            diagonal[stride * p->corner[c]] += p->strength / 3 * p->weight[c] * p->weight[c];
+    }
+}
+
+void npg_energy_band(npg_band *band, const npg_energy_system *s, size_t v, const float *diagonal,
+                     size_t stride)
+{
+    for (size_t t = 0; t < band->count; t++) {
+        band->main[t] = (double)diagonal[stride * t];
+        band->near[t] = band->far[t] = 0;
+    }
+    npg_band_add_bend(band, (double)s->lambda[v]);
+    npg_band_factor(band);
+}
+
 static void add_shape(float *restrict image, const npg_energy_system *s, const float *restrict x)
 {
     float shape = (float)s->shape;

@@ -6,6 +6,7 @@ small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6}' --faces 400
     --keyframe 6 --bars residual=100,flipped=100 --quiet)
 free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3}')
+grids=(--method '{"preset": "grids", "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 60}')
 
 # What a run that was killed with two states left is in "broken".
 setup_file() {
@@ -78,12 +79,16 @@ same() {
     NEUPIG=$NEUPIG "$BATS_TEST_DIRNAME/kill_and_resume.sh" 2 12 5 capture/points "${small[@]}"
 }
 
-@test "SIGTERM ends with 75 within 5 s, and the next run goes on" {
-    kill_at stopped TERM 1 --method '{"epochs": 500}'
-    [ $killed_status -eq 75 ]
-    grep -q "run again to resume" stopped.log
-    go_on stopped --method '{"epochs": 500}'
-    grep -q resumed_frames stopped/report.json
+@test "SIGTERM inside a window of either solver ends with 75 within 5 s, and the next run goes on" {
+    for solver in joint grids; do
+        local options=(--method '{"epochs": 500}')
+        [ $solver = joint ] || options=("${grids[@]}" "${options[@]}")
+        kill_at stopped TERM 1 "${options[@]}"
+        [ $killed_status -eq 75 ]
+        grep -q "run again to resume" stopped.log
+        go_on stopped "${options[@]}"
+        grep -q resumed_frames stopped/report.json
+    done
 }
 
 @test "a finished job says so and does nothing" {
@@ -108,13 +113,20 @@ same() {
     done
 }
 
-@test "damaged latent grids, of frames without alignment, are said likewise" {
-    "$NEUPIG" run capture/points -o free "${small[@]}" "${free[@]}" >free.log
-    kill_at grids KILL 2 "${free[@]}"
-    printf '\x5a\xa5' | dd of="$(ls grids/job/window_*.vdb | tail -1)" bs=1 seek=3000 conv=notrunc status=none
-    go_on grids "${free[@]}"
-    [[ "$output" == *"is damaged"*"resumes from the window before"* ]]
-    diff -r free/meshes grids/meshes
+@test "damaged latent grids and states of them, over poses and without alignment, are said likewise" {
+    for name in free grids; do
+        local -n options=$name
+        "$NEUPIG" run capture/points -o $name-whole "${small[@]}" "${options[@]}" >$name.log
+        kill_at $name KILL 2 "${options[@]}"
+        cp -r $name $name-cut
+        printf '\x5a\xa5' | dd of="$(ls $name/job/window_*.vdb | tail -1)" bs=1 seek=3000 conv=notrunc status=none
+        truncate -s $(($(last_record $name-cut/job/store.npg state) + 2000)) $name-cut/job/store.npg
+        for out in $name $name-cut; do
+            go_on $out "${options[@]}"
+            [[ "$output" == *"is damaged"*"resumes from the window before"* ]]
+            diff -r $name-whole/meshes $out/meshes
+        done
+    done
 }
 
 @test "without any state that is whole the job starts over" {

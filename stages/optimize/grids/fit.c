@@ -500,6 +500,14 @@ static double rate_at(double rate_end, const npg_fit_step *step)
     return rate_end + (1 - rate_end) * 0.5 * (1 + cos(M_PI * part));
 }
 
+void npg_fit_rest(npg_fit *fit)
+{
+    npg_mlp_shape shape = shape_of(&fit->settings.grid);
+    npg_mlp_places at = npg_mlp_places_of(&shape);
+    memset(fit->params + at.head, 0, (at.b2 - at.head) * sizeof *fit->params);
+    memset(fit->params + at.head_bias, 0, (at.w1z - at.head_bias) * sizeof *fit->params);
+}
+
 void npg_fit_set_pace(npg_fit *fit, npg_confidence confidence, double rate_end)
 {
     fit->settings.paper.confidence = confidence;

@@ -59,6 +59,9 @@ void npg_fit_close(npg_fit **fit);
 npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count, int64_t key,
                          npg_fit_measure *measure, void *user);
 
+/* Before a window: the field is at rest, zero or the reference, whatever it knows: the decoder's head is zero. */
+void npg_fit_rest(npg_fit *fit);
+
 /* The confidence and the last learning rates (as a share of the first) from now on. */
 void npg_fit_set_pace(npg_fit *fit, npg_confidence confidence, double rate_end);
 

@@ -1,11 +1,13 @@
 /* Grids: the energy's least over fields: latent grids and decoder give the ways of few vertices of the surface
  * from the smoothed poses, and these carry the others.
  *
- *     d(v, t) = c sum_i b_i(v) (f(i, t) - f_0(i, t)),   E(s + d) = E(s) + d^T A d - 2 r^T d
+ *     d(v, .) = c sum_i b_i(v) (D_i + lambda_i B)^-1 D_i f(i, .),   E(s + d) = E(s) + d^T A d - 2 r^T d
  *
- * c: the noise of the points, so that the field's values are of one size; f_0: what it had before the window, so
- * that it starts at the smoothed poses whatever it knows.  The state of least energy is kept, and goes as far along
- * its way as is best. */
+ * c: the noise of the points, so that the field's values are of one size; D_i + lambda_i B: what A has of vertex i
+ * alone, so that ways are as even in time as its motion is, whatever frequencies the field has (as the latent
+ * grids are in space).  A window starts at the smoothed poses: the decoder's head is zero, and what the layers
+ * before it and the grids learnt in the window before stays.  The state of least energy is kept, and goes as far
+ * along its way as is best. */
 #include <math.h>
 #include <string.h>
 
@@ -33,9 +35,9 @@ typedef struct grids {
     double at_start, least;    /* E(s), and the least so far                     */
     float scale;               /* of ways to the field's values: rates are for those of the usual noise */
     size_t threads;
-    float *before;              /* T x S x 3: f_0                                 */
-    float *gradient;            /* T x S x 3; loan                                */
-    const float *field;         /* T x S x 3: f; loan                             */
+    float *diagonal;            /* T x W: D                                       */
+    float *gradient;            /* T x S x 3; scratch until it is there; loan     */
+    const float *from;          /* T x S x 3: f, or the gradient by d; loan       */
     float *ways, *image, *best; /* T x W x 3: d, A d, and the best d so far      */
     double *sums;               /* T x 2: d A d, r d                              */
     npg_arena window;           /* holds these                                    */
@@ -80,15 +82,37 @@ static npg_status grids_open(void **out, const npg_solver_setup *setup)
 
 /* ---- the energy ---- */
 
+/* `gradient` = (D + lambda B)^-1 D times the field's ways, or where it is the energy's by d the transpose. */
+static npg_status even_vertices(void *user, size_t part)
+{
+    grids *g = user;
+    size_t n = g->system->frame_count, row = 3 * g->samples->mesh->vert_count;
+    double *memory;
+    NPG_TRY(npg_alloc_array(&memory, NPG_FOR_FIT, 7 * n, sizeof *memory));
+    npg_band band = {n, memory, memory + n, memory + 2 * n};
+    double *line = memory + 3 * n, *by = line + 3 * n;
+    for (size_t i = part; i < row / 3; i += g->threads) {
+        const float *diagonal = g->diagonal + g->samples->vertex[i], *from = g->from + 3 * i;
+        float *to = g->gradient + 3 * i;
+        npg_energy_band(&band, g->system, g->samples->vertex[i], diagonal, g->vert_count);
+        for (size_t t = 0; t < n; t++) by[t] = (double)(g->scale * diagonal[t * g->vert_count]);
+        for (size_t k = 0; k < 3 * n; k++)
+            line[k] = (to == from ? 1 : by[k / 3]) * (double)from[k / 3 * row + k % 3];
+        for (size_t axis = 0; axis < 3; axis++) npg_band_solve(&band, line + axis, 3);
+        for (size_t k = 0; k < 3 * n; k++)
+            to[k / 3 * row + k % 3] = (float)((to == from ? by[k / 3] : 1) * line[k]);
+    }
+    npg_release(&memory);
+    return NPG_OK;
+}
+
 static npg_status carry_frames(void *user, size_t part)
 {
     grids *g = user;
     size_t w = 3 * g->vert_count, s = 3 * g->samples->mesh->vert_count;
     for (size_t t = part; t < g->system->frame_count; t += g->threads) {
-        float *way = g->gradient + t * s; /* scratch until the energy's is there */
-        for (size_t i = 0; i < s; i++) way[i] = g->scale * (g->field[t * s + i] - g->before[t * s + i]);
         memset(g->ways + t * w, 0, w * sizeof(float));
-        npg_carry(g->ways + t * w, g->samples->mesh, g->places, g->vert_count, way);
+        npg_carry(g->ways + t * w, g->samples->mesh, g->places, g->vert_count, g->gradient + t * s);
     }
     return NPG_OK;
 }
@@ -106,7 +130,7 @@ static npg_status measure_frames(void *user, size_t part)
         for (size_t i = 0; i < w; i++) {
             sums[0] += (double)way[i] * (double)image[i];
             sums[1] += (double)way[i] * (double)right[i];
-            image[i] = 2 * g->scale * (image[i] - right[i]);
+            image[i] = 2 * (image[i] - right[i]);
         }
         memset(g->gradient + t * s, 0, s * sizeof(float));
         npg_carry_back(g->gradient + t * s, g->samples->mesh, g->places, g->vert_count, image);
@@ -119,9 +143,12 @@ static npg_status measure(void *user, double *loss, float *gradient, const float
     grids *g = user;
     double bent = 0, along = 0;
     g->gradient = gradient;
-    g->field = field;
+    g->from = field;
+    NPG_TRY(npg_parallel(even_vertices, g, g->threads));
     NPG_TRY(npg_parallel(carry_frames, g, g->threads));
     NPG_TRY(npg_parallel(measure_frames, g, g->threads));
+    g->from = gradient;
+    NPG_TRY(npg_parallel(even_vertices, g, g->threads));
     for (size_t t = 0; t < g->system->frame_count; t++) {
         bent += g->sums[2 * t];
         along += g->sums[2 * t + 1];
@@ -155,17 +182,14 @@ double npg_grids_time(const npg_plan *plan, double span, int64_t index)
 static npg_status begin(grids *g, const npg_problem *problem)
 {
     npg_fit_frame *frames;
-    size_t s = 3 * g->samples->mesh->vert_count;
     NPG_TRY(npg_fit_recall(g->fit, problem->window));
+    npg_fit_rest(g->fit);
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, problem->count, sizeof *frames));
     for (size_t t = 0; t < problem->count; t++)
         frames[t] = (npg_fit_frame){
             .index = problem->frames[t].index,
             .time = npg_grids_time(&g->facts->plan, NPG_GRIDS_SPAN, problem->frames[t].index)};
     npg_status status = npg_fit_begin(g->fit, frames, problem->count, frames[0].index, measure, g);
-    if (!status) status = npg_fit_run(g->fit, 0, 0, NULL, NULL);
-    for (size_t t = 0; t < problem->count && !status; t++)
-        status = npg_fit_vertices(g->fit, g->before + t * s, t);
     npg_release(&frames);
     return status;
 }
@@ -173,18 +197,20 @@ static npg_status begin(grids *g, const npg_problem *problem)
 /* The result is the best so far from the beginning on: none. */
 static npg_status take_window(grids *g, const npg_problem *problem)
 {
-    size_t count = problem->count, wide = count * g->vert_count, few = count * g->samples->mesh->vert_count;
+    size_t count = problem->count, wide = count * g->vert_count;
     g->system = npg_energy_system_of(problem->energy);
     g->at_start = g->least = npg_energy_at_start(problem->energy);
     g->threads = npg_parallel_parts(count, 1, THREADS_MAX);
     g->scale = (float)(npg_energy_noise(problem->energy) / NOISE_USUAL);
-    g->before = npg_arena_take(&g->window, few, 3 * sizeof(float));
+    g->diagonal = npg_arena_take(&g->window, wide, sizeof(float));
     g->ways = npg_arena_take(&g->window, wide, 3 * sizeof(float));
     g->image = npg_arena_take(&g->window, wide, 3 * sizeof(float));
     g->sums = npg_arena_take(&g->window, 2 * count, sizeof(double));
     g->best = problem->result;
     memset(g->best, 0, 3 * wide * sizeof(float));
-    return npg_arena_status(&g->window);
+    NPG_TRY(npg_arena_status(&g->window));
+    for (size_t t = 0; t < count; t++) npg_energy_diagonal(g->diagonal + t * g->vert_count, 1, g->system, t);
+    return NPG_OK;
 }
 
 static npg_status grids_solve(void *solver, npg_solved *solved, const npg_problem *problem,
@@ -207,7 +233,7 @@ static size_t grids_memory(const npg_solver_settings *settings, size_t verts, si
     const npg_fit_settings fit = settings_of(settings);
     size_t samples = verts < 2 * SAMPLES ? verts : SAMPLES;
     (void)points;
-    return npg_fit_memory(&fit, samples, frames, 0) + frames * (2 * verts + samples) * 3 * sizeof(float) +
+    return npg_fit_memory(&fit, samples, frames, 0) + frames * verts * 7 * sizeof(float) +
            verts * sizeof(npg_surface_hit);
 }
 

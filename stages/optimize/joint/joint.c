@@ -16,6 +16,7 @@ typedef struct work {
     float *step, *right, *direction, *image;
     float *factors;      /* each vertex' diagonals, factored: main, near, far */
     float by;            /* what `step` and `right` move by along `direction` and `image` */
+    double gained;       /* of E */
     double *frame_sums;  /* T */
     double sums[BLOCKS]; /* of vertices */
 } work;
@@ -36,30 +37,11 @@ static npg_status multiply_frames(void *user, size_t part)
 
 /* ---- the preconditioner ---- */
 
-/* The diagonal of all but the motion, which each vertex' factors hold whole; into the first of the factors. */
-static void gather_diagonal(const work *w, size_t t)
-{
-    const npg_energy_system *s = w->s;
-    float *factors = w->factors + 3 * t * s->vert_count;
-    for (size_t v = 0; v < s->vert_count; v++)
-        factors[3 * v] = (float)s->shape * (float)(s->ring.start[v + 1] - s->ring.start[v]) +
-                         s->shares[t] * s->ties[v] + 1e-6f;
-    for (size_t i = 0; i < s->pull_counts[t]; i++) {
-        const npg_point_pull *p = &s->pulls[t * s->most + i];
-        for (size_t c = 0; c < 3; c++) /* a third: the mean over the directions */
-            factors[3 * (size_t)p->corner[c]] += p->strength / 3 * p->weight[c] * p->weight[c];
-    }
-}
-
 static void factor_vertex(const work *w, npg_band *band, size_t v)
 {
     const npg_energy_system *s = w->s;
-    size_t n = s->frame_count;
-    memset(band->main, 0, 3 * n * sizeof *band->main);
-    npg_band_add_bend(band, (double)s->lambda[v]);
-    for (size_t t = 0; t < n; t++) band->main[t] += (double)w->factors[3 * (t * s->vert_count + v)];
-    npg_band_factor(band);
-    for (size_t t = 0; t < n; t++) {
+    npg_energy_band(band, s, v, w->factors + 3 * v, 3 * s->vert_count);
+    for (size_t t = 0; t < s->frame_count; t++) {
         float *to = w->factors + 3 * (t * s->vert_count + v);
         to[0] = (float)band->main[t];
         to[1] = (float)band->near[t];
@@ -70,7 +52,8 @@ static void factor_vertex(const work *w, npg_band *band, size_t v)
 static npg_status gather_diagonals(void *user, size_t part)
 {
     work *w = user;
-    for (size_t t = part; t < w->s->frame_count; t += w->threads) gather_diagonal(w, t);
+    for (size_t t = part; t < w->s->frame_count; t += w->threads)
+        npg_energy_diagonal(w->factors + 3 * t * w->s->vert_count, 3, w->s, t);
     return NPG_OK;
 }
 
@@ -155,6 +138,7 @@ static npg_status iterate(work *w, npg_solved *solved, int64_t most, npg_solver_
         double along = sum_of(w->frame_sums, s->frame_count), before = now;
         if (!(along > 0)) break;
         w->by = (float)(now / along);
+        w->gained += now * now / along;
         NPG_TRY(npg_parallel(move_blocks, w, w->threads));
         now = sum_of(w->sums, BLOCKS);
         share = now / before;
@@ -186,6 +170,8 @@ static npg_status joint_solve(void *solver, npg_solved *solved, const npg_proble
     if (!status) status = npg_parallel(gather_diagonals, &w, w.threads);
     if (!status) status = npg_parallel(factor_vertices, &w, w.threads);
     if (!status) status = iterate(&w, solved, problem->settings->epochs, watch, user);
+    double at_start = npg_energy_at_start(problem->energy);
+    solved->energy = at_start > 0 ? 1 - w.gained / at_start : 1;
     npg_arena_release(&arena);
     return status;
 }
