@@ -127,14 +127,17 @@ static npg_status find_patches(uint32_t *parent, npg_arena *arena, const float *
     return NPG_OK;
 }
 
-/* A patch turns as a whole, if at all: the field is as coarse as the points, but sides that agree along a sheet thinner
- * than their spacing were known to who gave them. */
+/* Few that face away are turned one by one.  Of more a patch turns as a whole, if at all: the field is as coarse as the
+ * points, but sides that agree along a sheet thinner than their spacing were known to who gave them. */
 static npg_status let_patches_vote(uint8_t *away, npg_arena *arena, const float *points, const float *given,
                                    size_t n)
 {
     uint32_t *parent = npg_arena_take(arena, n, sizeof *parent);
     int32_t *votes = npg_arena_take(arena, n, sizeof *votes); /* of roots */
+    size_t count = 0;
     NPG_TRY(npg_arena_status(arena));
+    for (size_t i = 0; i < n; i++) count += away[i];
+    if ((double)count <= NPG_FEW * (double)n) return NPG_OK;
     NPG_TRY(find_patches(parent, arena, points, given, n));
     for (uint32_t i = 0; i < n; i++) votes[npg_set_root(parent, i)] += away[i] ? 1 : -1;
     for (uint32_t i = 0; i < n; i++) away[i] = votes[npg_set_root(parent, i)] > 0;

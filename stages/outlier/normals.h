@@ -34,8 +34,8 @@ bool npg_winding_is_whole(size_t point_count);
 /* Unit normals from nothing: outward for closed bodies, to the convex side for open ones. */
 npg_status npg_normals_make(float *normals, const float *points, size_t point_count);
 
-/* Find normals on the wrong side among given ones (unit length) and turn them, beginning from the sides given.
- * *flipped counts the turned ones. */
+/* Find normals on the wrong side among given ones (unit length) and turn them, beginning from the sides given:
+ * one by one where few face away, else by whole patches of neighbours that agree.  *flipped counts the turned ones. */
 npg_status npg_normals_mend(float *normals, size_t *flipped, const float *points, size_t point_count);
 
 /* Median distance to the 8th neighbour, over the points: how dense a cloud is. */
