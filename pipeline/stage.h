@@ -52,8 +52,7 @@ typedef struct npg_choice {
     bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
     int64_t ranked[NPG_CHOICE_MAX];       /* keyframes to try where the one chosen fails, the best first */
     size_t ranked_count;
-    bool
-        is_tried; /* the key alone is read: others are compared if its first pass says that one could do better */
+    bool is_tried; /* the key alone is read: others are compared if its pass says that one could do better */
 } npg_choice;
 
 /* Whether the frame with this index is one of the candidates. */

@@ -21,8 +21,7 @@
 typedef struct npg_judgement {
     size_t count; /* frames judged */
     double mean;  /* of D_t, over these */
-    double
-        own; /* D_t in the frame that the surface was made from, where that was seen: of what has points there */
+    double own;   /* D_t in the frame that the surface was made from, of what has points there */
     double of_frame[NPG_CHOICE_FRAMES]; /* D_t by place in the sample, NAN: it was not judged */
 } npg_judgement;
 
