@@ -294,11 +294,14 @@ static void set_choice(npg_worker *worker)
     const keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     bool chooses = has_candidates(worker) && !goes_by_area(worker);
-    /* A pass that follows one side of the body says little of what other frames see. */
-    bool is_tried = chooses && facts->brief.rounds_left && !facts->sensor_count_max;
+    npg_choice *choice = npg_own(worker, choice);
     if (facts->planned_count < 2 || *own_mesh(worker) || state->choice == CHOICE_PAPER) return;
-    npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count, !chooses || is_tried);
-    npg_own(worker, choice)->is_tried = is_tried;
+    npg_candidates_list(choice, facts->plan.key, facts->planned_count, true);
+    /* A pass that follows one side of the body says little of what other frames see, and a sample little of all. */
+    bool is_tried = chooses && facts->brief.rounds_left && !facts->sensor_count_max &&
+                    (int64_t)choice->count == facts->planned_count;
+    if (chooses && !is_tried) npg_candidates_list(choice, facts->plan.key, facts->planned_count, false);
+    choice->is_tried = is_tried;
 }
 
 static void report_key(npg_worker *worker, const candidate *key)
