@@ -20,7 +20,7 @@ typedef struct expectation {
     npg_arena arena;
     const npg_mesh *mesh;
     double (*normals)[3], *areas; /* F                                                     */
-    uint32_t *nearest, *patch;    /* F: direction; lowest vertex of its patch, NONE: seen   */
+    uint32_t *nearest, *patch;    /* F: direction, where unseen; lowest vertex of its patch, NONE: seen   */
     uint8_t *keep;                /* F                                                     */
     uint32_t *order;              /* faces without points, patch by patch                   */
     size_t unseen;                /* of them                                                */
@@ -64,8 +64,11 @@ static npg_status find_patches(expectation *e, const float *points, size_t point
         e->patch[f] = is_seen ? NONE : face[0];
         for (int k = 1; k < 3 && !is_seen; k++) npg_set_join(parent, face[0], face[k]);
     }
-    for (size_t f = 0; f < mesh->face_count; f++)
-        if (e->patch[f] != NONE) e->patch[f] = npg_set_root(parent, e->patch[f]);
+    for (uint32_t f = 0; f < mesh->face_count; f++) {
+        if (e->patch[f] == NONE) continue;
+        e->patch[f] = npg_set_root(parent, e->patch[f]);
+        e->order[e->unseen++] = f;
+    }
     return NPG_OK;
 }
 
@@ -74,7 +77,6 @@ static void add_up(expectation *e)
     for (size_t k = 0; k < DIRECTIONS; k++) npg_direction_spread(e->directions[k], k, DIRECTIONS);
     for (size_t f = 0; f < e->mesh->face_count; f++) {
         e->areas[f] = npg_face_normal(e->normals[f], e->mesh->vert_pos, e->mesh->faces + 3 * f);
-        e->nearest[f] = nearest_of(e, f);
         e->keep[f] = 1;
         add_alike(e->all, e, f, e->areas[f]);
         if (e->patch[f] == NONE) add_alike(e->seen, e, f, e->areas[f]);
@@ -90,8 +92,7 @@ static int by_patch(const void *a, const void *b, void *user)
 
 static void sort_patches(expectation *e)
 {
-    for (uint32_t f = 0; f < e->mesh->face_count; f++)
-        if (e->patch[f] != NONE) e->order[e->unseen++] = f;
+    for (size_t i = 0; i < e->unseen; i++) e->nearest[e->order[i]] = nearest_of(e, e->order[i]);
     qsort_r(e->order, e->unseen, sizeof *e->order, by_patch, e->patch);
 }
 
@@ -147,7 +148,7 @@ npg_status npg_mesh_trim_expected(npg_mesh **mesh, double *share, const float *p
     npg_status status = open_expectation(&e, *mesh);
     *share = 0;
     if (!status) status = find_patches(&e, points, point_count, dist_max);
-    if (!status) {
+    if (!status && e.unseen) {
         add_up(&e);
         sort_patches(&e);
         bool any = false;

@@ -199,10 +199,10 @@ double npg_mesh_share_in(const npg_mesh *mesh, const npg_cube_set *cubes);
  * N >= 1; faces without points near them keep their slope.  Equal input gives equal bits.  NPG_MEMORY. */
 npg_status npg_mesh_denoise(npg_mesh *mesh, const float *points, const float *normals, size_t point_count);
 
-/* Unseen: which vertices of the finished reference no point supports that it was made from. */
-
 /* Keep the faces whose keep_face (F) is not 0.  *share gets the share of the area that went. */
 npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face);
+
+/* Unseen: which vertices of the finished reference no point supports that it was made from. */
 
 /* Expected: drop the patches of surface without points (farther than dist_max from all N, by the mean of a face's
  * vertices) where all but NPG_FEW of what faces the same way has some: they would have been seen if they were there
