@@ -221,11 +221,20 @@ static npg_status smooth(npg_energy *e, size_t count)
 
 /* ---- the system ---- */
 
-static void pull_to_pose(npg_energy *e, float *right, size_t t)
+static void pull_to_pose(float *right, const npg_energy *e, size_t t)
 {
     const float *now = e->frames[t].positions, *pose = e->given[t].positions;
     for (size_t i = 0; i < 3 * e->mesh->vert_count; i++)
         right[i] += e->system.shares[t] * e->system.ties[i / 3] * (pose[i] - now[i]);
+}
+
+void npg_energy_even(float *right, const npg_energy *e, const float *d, size_t t)
+{
+    memset(right, 0, 3 * e->mesh->vert_count * sizeof *right);
+    npg_energy_bend(right, &e->system, e->positions, t, -1);
+    npg_energy_bend(right, &e->system, d, t, -1);
+    npg_energy_tie(right, &e->system, d, t, -1);
+    pull_to_pose(right, e, t);
 }
 
 /* The right side: -gradient / 2 of the energy where the surface is now. */
@@ -236,7 +245,7 @@ static void fill_right(npg_energy *e, size_t t)
     float *right = s->right + t * w * 3;
     memset(right, 0, w * 3 * sizeof *right);
     npg_energy_bend(right, s, e->positions, t, -1);
-    pull_to_pose(e, right, t);
+    pull_to_pose(right, e, t);
     for (size_t i = 0; i < s->pull_counts[t]; i++) {
         const npg_point_pull *p = &s->pulls[t * s->most + i];
         float across = 0;

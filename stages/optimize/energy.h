@@ -64,6 +64,10 @@ struct npg_energy_system *npg_energy_system_of(npg_energy *energy);
 /* E(s). */
 double npg_energy_at_start(const npg_energy *energy);
 
+/* right (W x 3) = -gradient / 2 in frame t of poses and motion alone, a way d (T x W x 3) from s:
+ *     share_t tie (y - s - d) - c lambda B (s + d), B = D^T D of second differences. */
+void npg_energy_even(float *right, const npg_energy *energy, const float *d, size_t t);
+
 /* Bytes that it takes at most. */
 size_t npg_energy_memory(const npg_energy_settings *settings, size_t vert_count, size_t frames);
 
@@ -159,7 +163,8 @@ void npg_energy_band(npg_band *band, const npg_energy_system *system, size_t v, 
 /* image_t = the rows of A d that belong to frame t; d and image: T x W x 3. */
 void npg_energy_multiply(float *image, const npg_energy_system *system, const float *d, size_t t);
 
-/* image_t += the part of the bend in time: sum_s B_ts lambda_v x_s, B = D^T D. */
+/* image_t += the part of the ties, or of the bend in time, times sign: sum_s B_ts lambda_v x_s, B = D^T D. */
+void npg_energy_tie(float *image, const npg_energy_system *system, const float *x, size_t t, float sign);
 void npg_energy_bend(float *image, const npg_energy_system *system, const float *x, size_t t, float sign);
 
 /* Match: a frame's points and the places of the surface that they pull at. */

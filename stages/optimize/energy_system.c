@@ -29,6 +29,12 @@ void npg_energy_bend(float *image, const npg_energy_system *s, const float *x, s
     }
 }
 
+void npg_energy_tie(float *image, const npg_energy_system *s, const float *x, size_t t, float sign)
+{
+    const float *from = x + t * 3 * s->vert_count;
+    for (size_t i = 0; i < 3 * s->vert_count; i++) image[i] += sign * s->shares[t] * s->ties[i / 3] * from[i];
+}
+
 void npg_energy_diagonal(float *diagonal, size_t stride, const npg_energy_system *s, size_t t)
 {
     for (size_t v = 0; v < s->vert_count; v++)
@@ -66,11 +72,6 @@ static void add_shape(float *restrict image, const npg_energy_system *s, const f
     }
 }
 
-static void add_tie(float *restrict image, const npg_energy_system *s, const float *restrict x, size_t t)
-{
-    for (size_t i = 0; i < 3 * s->vert_count; i++) image[i] += s->shares[t] * s->ties[i / 3] * x[i];
-}
-
 static void add_pull(float *image, const npg_point_pull *p, const float *x)
 {
     float at[3] = {0}, across = 0;
@@ -91,6 +92,6 @@ void npg_energy_multiply(float *image, const npg_energy_system *s, const float *
     memset(image, 0, size * sizeof *image);
     add_shape(image, s, x);
     npg_energy_bend(image, s, d, t, 1);
-    add_tie(image, s, x, t);
+    npg_energy_tie(image, s, d, t, 1);
     for (size_t i = 0; i < s->pull_counts[t]; i++) add_pull(image, &s->pulls[t * s->most + i], x);
 }

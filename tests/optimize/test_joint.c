@@ -139,6 +139,43 @@ static void neighbours_carry_what_is_not_seen(void **state)
     npg_mesh_unref(&c.ball);
 }
 
+/* Poses and motion alone: their part of the gradient, difference by difference. */
+static void even_is_of_poses_and_motion(void **state)
+{
+    static capture c;
+    static float d[FRAMES * 3 * VERTS], right[FRAMES * 3 * VERTS];
+    static double x[FRAMES * 3 * VERTS], wanted[FRAMES * 3 * VERTS];
+    enum { ROW = 3 * VERTS };
+    npg_energy_frame frames[FRAMES];
+    npg_energy *energy;
+    npg_random random = npg_random_stream(6, 0, 0);
+    double off = 0, size = 0;
+    (void)state;
+    make_capture(&c, 0.01f, 0.005f);
+    fill_frames(frames, &c);
+    assert_int_equal(npg_energy_open(&energy, c.ball, &usual.energy), NPG_OK);
+    assert_int_equal(npg_energy_set(energy, frames, FRAMES), NPG_OK);
+    const npg_energy_system *s = npg_energy_system_of(energy);
+    for (size_t i = 0; i < FRAMES * ROW; i++) {
+        size_t t = i / ROW, k = i % ROW;
+        d[i] = 0.01f * noise_of(&random);
+        x[i] = (double)npg_energy_smoothed(energy)[i] + (double)d[i];
+        wanted[i] = (double)(s->shares[t] * s->ties[k / 3]) * ((double)c.pose[t][k] - x[i]);
+    }
+    for (size_t i = ROW; i < (FRAMES - 1) * ROW; i++) {
+        double bend = (double)s->lambda[i % ROW / 3] * (x[i - ROW] - 2 * x[i] + x[i + ROW]);
+        wanted[i - ROW] -= bend, wanted[i] += 2 * bend, wanted[i + ROW] -= bend;
+    }
+    for (size_t t = 0; t < FRAMES; t++) npg_energy_even(right + t * ROW, energy, d, t);
+    for (size_t i = 0; i < FRAMES * ROW; i++) {
+        off += fabs((double)right[i] - wanted[i]);
+        size += fabs(wanted[i]);
+    }
+    assert_true(size > 0 && off < 1e-3 * size);
+    npg_energy_close(&energy);
+    npg_mesh_unref(&c.ball);
+}
+
 static void equal_input_gives_equal_bits(void **state)
 {
     static capture a, b;
@@ -172,9 +209,11 @@ static void short_windows_work(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(band_solves), cmocka_unit_test(smoothing_follows_the_noise),
-        cmocka_unit_test(neighbours_carry_what_is_not_seen), cmocka_unit_test(equal_input_gives_equal_bits),
-        cmocka_unit_test(short_windows_work)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(band_solves),
+                                       cmocka_unit_test(smoothing_follows_the_noise),
+                                       cmocka_unit_test(neighbours_carry_what_is_not_seen),
+                                       cmocka_unit_test(even_is_of_poses_and_motion),
+                                       cmocka_unit_test(equal_input_gives_equal_bits),
+                                       cmocka_unit_test(short_windows_work)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,11 +1,14 @@
 /* Grids: the energy's least over fields: latent grids and decoder give the ways of few vertices of the surface
  * from the smoothed poses, and these carry the others.
  *
- *     d(v, .) = c sum_i b_i(v) (D_i + lambda_i B)^-1 D_i f(i, .),   E(s + d) = E(s) + d^T A d - 2 r^T d
+ *     d(v, .) = a(v, .) + c sum_i b_i(v) (D_i + lambda_i B)^-1 D_i f(i, .)
+ *     E(s + d) = E(s) + d^T A d - 2 r^T d
  *
+ * a: what poses and motion still ask of each vertex alone, points and edges holding against it: steps
+ * (D + lambda B)^-1 times their part of -gradient / 2 (npg_energy_even()), as long as E falls.
  * c: the noise of the points, so that the field's values are of one size; D_i + lambda_i B: what A has of vertex i
  * alone, so that ways are as even in time as its motion is, whatever frequencies the field has (as the latent
- * grids are in space).  A window starts at the smoothed poses: the decoder's head is zero, and what the layers
+ * grids are in space).  A window starts at a: the decoder's head is zero, and what the layers
  * before it and the grids learnt in the window before stays.  The state of least energy is kept, and goes as far
  * along its way as is best. */
 #include <math.h>
@@ -36,6 +39,7 @@ typedef struct grids {
     float scale;               /* of ways to the field's values: rates are for those of the usual noise */
     size_t threads;
     float *diagonal;            /* T x W: D                                       */
+    float *base;                /* T x W x 3: a                                   */
     float *gradient;            /* T x S x 3; scratch until it is there; loan     */
     const float *from;          /* T x S x 3: f, or the gradient by d; loan       */
     float *ways, *image, *best; /* T x W x 3: d, A d, and the best d so far      */
@@ -82,6 +86,13 @@ static npg_status grids_open(void **out, const npg_solver_setup *setup)
 
 /* ---- the energy ---- */
 
+/* line (T x 3) = (D + lambda B)^-1 line, of vertex v.  band: room for T rows. */
+static void even_line(const grids *g, npg_band *band, double *line, size_t v)
+{
+    npg_energy_band(band, g->system, v, g->diagonal + v, g->vert_count);
+    for (size_t axis = 0; axis < 3; axis++) npg_band_solve(band, line + axis, 3);
+}
+
 /* `gradient` = (D + lambda B)^-1 D times the field's ways, or where it is the energy's by d the transpose. */
 static npg_status even_vertices(void *user, size_t part)
 {
@@ -94,11 +105,10 @@ static npg_status even_vertices(void *user, size_t part)
     for (size_t i = part; i < row / 3; i += g->threads) {
         const float *diagonal = g->diagonal + g->samples->vertex[i], *from = g->from + 3 * i;
         float *to = g->gradient + 3 * i;
-        npg_energy_band(&band, g->system, g->samples->vertex[i], diagonal, g->vert_count);
         for (size_t t = 0; t < n; t++) by[t] = (double)(g->scale * diagonal[t * g->vert_count]);
         for (size_t k = 0; k < 3 * n; k++)
             line[k] = (to == from ? 1 : by[k / 3]) * (double)from[k / 3 * row + k % 3];
-        for (size_t axis = 0; axis < 3; axis++) npg_band_solve(&band, line + axis, 3);
+        even_line(g, &band, line, g->samples->vertex[i]);
         for (size_t k = 0; k < 3 * n; k++)
             to[k / 3 * row + k % 3] = (float)((to == from ? by[k / 3] : 1) * line[k]);
     }
@@ -111,55 +121,117 @@ static npg_status carry_frames(void *user, size_t part)
     grids *g = user;
     size_t w = 3 * g->vert_count, s = 3 * g->samples->mesh->vert_count;
     for (size_t t = part; t < g->system->frame_count; t += g->threads) {
-        memset(g->ways + t * w, 0, w * sizeof(float));
+        memcpy(g->ways + t * w, g->base + t * w, w * sizeof(float));
         npg_carry(g->ways + t * w, g->samples->mesh, g->places, g->vert_count, g->gradient + t * s);
     }
     return NPG_OK;
 }
 
+/* image = A d, and the frames' shares of d A d and r d. */
 static npg_status measure_frames(void *user, size_t part)
 {
     grids *g = user;
-    size_t w = 3 * g->vert_count, s = 3 * g->samples->mesh->vert_count;
+    size_t w = 3 * g->vert_count;
     for (size_t t = part; t < g->system->frame_count; t += g->threads) {
-        const float *way = g->ways + t * w, *right = g->system->right + t * w;
-        float *image = g->image + t * w;
+        const float *way = g->ways + t * w, *right = g->system->right + t * w, *image = g->image + t * w;
         double *sums = g->sums + 2 * t;
         npg_energy_multiply(g->image, g->system, g->ways, t);
         sums[0] = sums[1] = 0;
         for (size_t i = 0; i < w; i++) {
             sums[0] += (double)way[i] * (double)image[i];
             sums[1] += (double)way[i] * (double)right[i];
-            image[i] = 2 * (image[i] - right[i]);
         }
+    }
+    return NPG_OK;
+}
+
+static npg_status carry_back(void *user, size_t part)
+{
+    grids *g = user;
+    size_t w = 3 * g->vert_count, s = 3 * g->samples->mesh->vert_count;
+    for (size_t t = part; t < g->system->frame_count; t += g->threads) {
+        const float *right = g->system->right + t * w;
+        float *image = g->image + t * w;
+        for (size_t i = 0; i < w; i++) image[i] = 2 * (image[i] - right[i]);
         memset(g->gradient + t * s, 0, s * sizeof(float));
         npg_carry_back(g->gradient + t * s, g->samples->mesh, g->places, g->vert_count, image);
     }
     return NPG_OK;
 }
 
+/* E(s + d); *along = r d, *bent = d A d. */
+static npg_status measure_ways(grids *g, double *loss, double *bent, double *along)
+{
+    *bent = *along = 0;
+    NPG_TRY(npg_parallel(measure_frames, g, g->threads));
+    for (size_t t = 0; t < g->system->frame_count; t++) {
+        *bent += g->sums[2 * t];
+        *along += g->sums[2 * t + 1];
+    }
+    *loss = g->at_start + *bent - 2 * *along;
+    return NPG_OK;
+}
+
+static void take_best(grids *g, double energy, double share)
+{
+    g->least = energy;
+    for (size_t i = 0; i < g->system->frame_count * 3 * g->vert_count; i++)
+        g->best[i] = (float)share * g->ways[i];
+}
+
 static npg_status measure(void *user, double *loss, float *gradient, const float *field)
 {
     grids *g = user;
-    double bent = 0, along = 0;
+    double bent, along;
     g->gradient = gradient;
     g->from = field;
     NPG_TRY(npg_parallel(even_vertices, g, g->threads));
     NPG_TRY(npg_parallel(carry_frames, g, g->threads));
-    NPG_TRY(npg_parallel(measure_frames, g, g->threads));
+    NPG_TRY(measure_ways(g, loss, &bent, &along));
+    NPG_TRY(npg_parallel(carry_back, g, g->threads));
     g->from = gradient;
     NPG_TRY(npg_parallel(even_vertices, g, g->threads));
-    for (size_t t = 0; t < g->system->frame_count; t++) {
-        bent += g->sums[2 * t];
-        along += g->sums[2 * t + 1];
-    }
     double share = bent > 0 ? fmax(0, along / bent) : 0; /* of the way, where E is least on it */
-    double best = g->at_start - share * along;
-    *loss = g->at_start + bent - 2 * along;
-    if (best >= g->least) return NPG_OK;
-    g->least = best;
-    for (size_t i = 0; i < g->system->frame_count * 3 * g->vert_count; i++)
-        g->best[i] = (float)share * g->ways[i];
+    if (g->at_start - share * along < g->least) take_best(g, g->at_start - share * along, share);
+    return NPG_OK;
+}
+
+/* ---- the base ---- */
+
+/* d = the best so far and a step of (D + lambda B)^-1. */
+static npg_status step_vertices(void *user, size_t part)
+{
+    grids *g = user;
+    size_t n = g->system->frame_count, row = 3 * g->vert_count;
+    double *memory;
+    NPG_TRY(npg_alloc_array(&memory, NPG_FOR_FIT, 6 * n, sizeof *memory));
+    npg_band band = {n, memory, memory + n, memory + 2 * n};
+    double *line = memory + 3 * n;
+    for (size_t v = part; v < g->vert_count; v += g->threads) {
+        for (size_t k = 0; k < 3 * n; k++) line[k] = (double)g->image[k / 3 * row + 3 * v + k % 3];
+        even_line(g, &band, line, v);
+        for (size_t k = 0; k < 3 * n; k++) {
+            size_t at = k / 3 * row + 3 * v + k % 3;
+            g->ways[at] = g->best[at] + (float)line[k];
+        }
+    }
+    npg_release(&memory);
+    return NPG_OK;
+}
+
+static npg_status find_base(grids *g, const npg_energy *energy)
+{
+    size_t row = 3 * g->vert_count;
+    double loss, bent, along;
+    for (;;) {
+        for (size_t t = 0; t < g->system->frame_count; t++)
+            npg_energy_even(g->image + t * row, energy, g->best, t);
+        NPG_TRY(npg_parallel(step_vertices, g, g->threads));
+        NPG_TRY(measure_ways(g, &loss, &bent, &along));
+        if (!(loss < g->least)) break;
+        take_best(g, loss, 1);
+    }
+    memcpy(g->base, g->best, g->system->frame_count * row * sizeof *g->base);
     return NPG_OK;
 }
 
@@ -203,6 +275,7 @@ static npg_status take_window(grids *g, const npg_problem *problem)
     g->threads = npg_parallel_parts(count, 1, THREADS_MAX);
     g->scale = (float)(npg_energy_noise(problem->energy) / NOISE_USUAL);
     g->diagonal = npg_arena_take(&g->window, wide, sizeof(float));
+    g->base = npg_arena_take(&g->window, wide, 3 * sizeof(float));
     g->ways = npg_arena_take(&g->window, wide, 3 * sizeof(float));
     g->image = npg_arena_take(&g->window, wide, 3 * sizeof(float));
     g->sums = npg_arena_take(&g->window, 2 * count, sizeof(double));
@@ -210,7 +283,7 @@ static npg_status take_window(grids *g, const npg_problem *problem)
     memset(g->best, 0, 3 * wide * sizeof(float));
     NPG_TRY(npg_arena_status(&g->window));
     for (size_t t = 0; t < count; t++) npg_energy_diagonal(g->diagonal + t * g->vert_count, 1, g->system, t);
-    return NPG_OK;
+    return find_base(g, problem->energy);
 }
 
 static npg_status grids_solve(void *solver, npg_solved *solved, const npg_problem *problem,
@@ -233,7 +306,7 @@ static size_t grids_memory(const npg_solver_settings *settings, size_t verts, si
     const npg_fit_settings fit = settings_of(settings);
     size_t samples = verts < 2 * SAMPLES ? verts : SAMPLES;
     (void)points;
-    return npg_fit_memory(&fit, samples, frames, 0) + frames * verts * 7 * sizeof(float) +
+    return npg_fit_memory(&fit, samples, frames, 0) + frames * verts * 10 * sizeof(float) +
            verts * sizeof(npg_surface_hit);
 }
 
