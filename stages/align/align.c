@@ -20,11 +20,6 @@
 #define POINTS_MOST 4  /* times the samples: points of a frame that are kept for the alignment */
 #define GROUP_MOST  96 /* frames that wait: a longer window is taken in parts                 */
 
-/* Steps of a fit that starts from what the pass before found: near its end, so neither loose nor many. */
-#define AGAIN_STEPS     6    /* at most; fewer where align-steps says so     */
-#define AGAIN_STIFFNESS 2    /* of the first step, in final stiffnesses      */
-#define AGAIN_WIDTH     0.02 /* of the first step's robust weight, in units  */
-
 #define RAY_BYTES   64  /* of a sample of the surface, to tell whether a sensor sees it */
 #define PRIOR_BYTES 512 /* of a node: how its edges are held, and by what is seen of it */
 
@@ -216,8 +211,7 @@ static npg_status count_hidden(const npg_worker *worker, npg_waiting *w, npg_sid
 static npg_status fit_pose(npg_worker *worker, npg_waiting *w, npg_side *at)
 {
     const state *s = npg_worker_state(worker);
-    const npg_tracker_effort again = {s->steps < AGAIN_STEPS ? (int)s->steps : AGAIN_STEPS, AGAIN_STIFFNESS,
-                                      AGAIN_WIDTH, 1};
+    const npg_tracker_effort again = npg_tracker_again(s->tracker);
     NPG_TRY(npg_pose_cache_start(&s->cache, s->tracker, w->frame.index, at->now, &w->is_known));
     if (w->cloud.count) {
         const npg_prior_poses prior = {.pose =
@@ -421,15 +415,12 @@ static int64_t frames_of_pass(const npg_worker *worker)
 }
 
 /* Frames that are followed, and those that are passed on: between the two, lost ones are searched. */
-#define FOLLOWED_COUNTS 0.8
 static void report_progress(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
     double frames = (double)frames_of_pass(worker), followed = (double)s->read;
-    double passed_on = followed - (double)s->group.count;
-    if (frames > 0)
-        npg_worker_step(worker, (FOLLOWED_COUNTS * followed + (1 - FOLLOWED_COUNTS) * passed_on) / frames,
-                        s->read, (int64_t)frames);
+    double both = 2 * followed - (double)s->group.count;
+    if (frames > 0) npg_worker_step(worker, both / (2 * frames), s->read, (int64_t)frames);
 }
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)

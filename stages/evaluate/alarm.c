@@ -7,16 +7,13 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "pipeline/order.h"
 #include "pipeline/stage.h"
 
 /* Set by trial, on captures whose topology changes and on ones whose fit fails. */
 #define HISTORY  64                     /* explained frames that the usual level is taken from        */
-#define SPREADS  6.0                    /* of normal noise, above the usual level: the bound          */
-#define SUSPECT  0.5                    /* of the bound                                               */
-#define LOST     3.0                    /* times the points' distance in the keyframe: off everywhere */
 #define LOST_FIT 0.004                  /* of the frame's diagonal: nearer than that it isn't         */
-#define CLEARLY  2.0                    /* times the misfit on the other side                         */
 #define RUN_MAX  (3 * NPG_ALARM_FRAMES) /* twice as many where each weighs half */
 
 /* clang-format off */
@@ -85,7 +82,7 @@ npg_level npg_level_of(double *values, size_t count, double floor)
 {
     double usual = median_of(values, count);
     for (size_t i = 0; i < count; i++) values[i] = fabs(values[i] - usual);
-    double spread = SPREADS * NPG_DEVIATIONS_PER_MEDIAN * median_of(values, count);
+    double spread = NPG_CLEARLY * NPG_BEYOND * NPG_DEVIATIONS_PER_MEDIAN * median_of(values, count);
     return (npg_level){usual, fmax(fmax(floor, spread), usual)};
 }
 
@@ -113,7 +110,7 @@ static double excess(const record *r, const npg_level *levels, int kind)
 
 static bool is_lost(const side *s, const record *r)
 {
-    return r->fit > fmax(LOST_FIT, LOST * s->key_fit);
+    return r->fit > fmax(LOST_FIT, NPG_BEYOND * s->key_fit);
 }
 
 /* Which misfits are a sign of another topology, and not of a surface that has lost the points: where points
@@ -123,9 +120,9 @@ static void select_misfits(bool counts[NPG_MISFITS], const side *s, const record
     double far = fmax(excess(r, levels, NPG_MISFIT_FAR), 0),
            unsupported = fmax(excess(r, levels, NPG_MISFIT_UNSUPPORTED), 0);
     bool is_off = is_lost(s, r);
-    counts[NPG_MISFIT_FAR] = far > CLEARLY * unsupported;
-    counts[NPG_MISFIT_UNSUPPORTED] = !is_off && unsupported > CLEARLY * far;
-    counts[NPG_MISFIT_STRETCHED] = !is_off && far < SUSPECT * levels[NPG_MISFIT_FAR].bound;
+    counts[NPG_MISFIT_FAR] = far > NPG_CLEARLY * unsupported;
+    counts[NPG_MISFIT_UNSUPPORTED] = !is_off && unsupported > NPG_CLEARLY * far;
+    counts[NPG_MISFIT_STRETCHED] = !is_off && NPG_CLEARLY * far < levels[NPG_MISFIT_FAR].bound;
     counts[NPG_MISFIT_VACATED] = counts[NPG_MISFIT_STRETCHED];
 }
 
@@ -206,7 +203,7 @@ static void process_frame(side *s, const record *r)
     npg_alarm_cause cause;
     if (s->is_raised || !isfinite(r->misfits[NPG_MISFIT_FAR].share)) return;
     double times = s->history_count ? clearest(&cause, s, r) : -1; /* the keyframe is what is usual */
-    if (!(times > SUSPECT)) {
+    if (!(NPG_CLEARLY * times > 1)) {
         clear_suspects(s);
         /* A frame whose fit is off everywhere must not raise what is usual. */
         if (!s->history_count || !is_lost(s, r)) add_to_history(s, r);

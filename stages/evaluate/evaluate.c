@@ -82,10 +82,6 @@ static npg_status measure_frame(npg_worker *worker, npg_frame *frame)
 
 /* ---- the verdict ---- */
 
-/* Times the bar on the median, for 95 % of the points: good fits of noisy captures keep to half of it, a lost
- * limb and a surface that follows noise do not.  Set by trial. */
-#define NEARLY_ALL_WITHIN 2.0
-
 /* All in per cent. */
 static const char *const fault_texts[NPG_FAULTS] = {
     "",
@@ -102,12 +98,13 @@ static const char *const fault_texts[NPG_FAULTS] = {
     "motion since the frame before, in % of the diagonal, unlike in the frames around,"};
 
 /* What is wrong with a frame by itself.  A comparison with NaN fails, as it should, but for the support: there
- * it means that nobody knows which points the reference is of. */
+ * it means that nobody knows which points the reference is of.  Of 95 % of the points good fits of noisy captures keep to
+ * the bar on the median, a lost limb and a surface that follows noise are clearly above it. */
 static fault fault_of(const evaluate_state *state, const npg_figures *f, double unseen_share)
 {
     const fault kinds[] = {
         {NPG_FAULT_MEDIAN, f->point_dist_median, state->residual_max},
-        {NPG_FAULT_P95, f->point_dist_p95, NEARLY_ALL_WITHIN * state->residual_max},
+        {NPG_FAULT_P95, f->point_dist_p95, NPG_CLEARLY * state->residual_max},
         {NPG_FAULT_COVERAGE, f->coverage,
          state->coverage_min * (1 - unseen_share)}, /* of what the keyframe saw */
         {NPG_FAULT_FLIPPED, f->flipped_share, state->flipped_max},

@@ -41,11 +41,11 @@ void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float
  *                points, where it is neither unsupported nor stretched.  A point is its nearest part's; the
  *                share counts what is missing
  *
- * reach = max(3 x spacing of the points on the surface, 1.5 % of the reference's diagonal), with noise
- * 5 x the median distance of the points, but no more than twice as far; the places are the largest ones.
+ * reach = max(NPG_BEYOND spacings of the points on the surface, NPG_DETAIL_SHARE of the reference's diagonal), with noise
+ * 2 NPG_WITHIN times the median distance of the points, but no more than twice as far; the places are the largest ones.
  *
- * What sampling can explain is nothing: a place of fewer than 12 points, and one on the surface
- * where fewer than 20 points would be expected or that has fewer than 6 vertices' share of the area.
+ * What sampling can explain is nothing: a place of fewer than NPG_PATCH points, and one on the surface
+ * where fewer than NPG_PATCH points would be expected or that has fewer than NPG_AROUND vertices' share of the area.
  * A reference with a border, or one that saw only a part of its frame, is never unsupported, stretched or
  * vacated: what cameras see differs.  Where it is known what of the surface they could see in a frame, the
  * rest of it is neither unsupported nor stretched, and has no share of the points; nor is what no point of the
@@ -115,7 +115,7 @@ size_t npg_measure_memory(const npg_measure_settings *settings, size_t point_cou
  * Each direction has a usual level of every misfit: median and median deviation of the last
  * explained frames, outward from the keyframe.  A frame is suspect when a misfit exceeds its level by half of
  *
- *     bound = max(floor, 6 x 1.4826 x median deviation, median)
+ *     bound = max(floor, 2 NPG_BEYOND x 1.4826 x median deviation, median)
  *
  * and unexplained when by all of it.  NPG_ALARM_FRAMES unexplained frames in a row raise the alarm (twice as
  * many where each is merely stretched: an alignment that slips does that, too, until it is found again),

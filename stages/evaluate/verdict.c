@@ -5,12 +5,11 @@
 
 #include "evaluate/evaluate_internal.h"
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "pipeline/order.h"
 
-/* Times the motion of the frames around: motions of dancers and animals, at an eighth of their frames too,
+/* NPG_BEYOND times the motion of the frames around is a jump: motions of dancers and animals, at an eighth of their frames too,
  * reach 2, a film's chicken 2.6 and 4 to 9 where it leaps; mirrored frames and other bodies 4 to 28. */
-#define JUMP 3.0
-
 enum { AROUND = NPG_ALARM_FRAMES }; /* motions on either side that tell what is usual, odd frames in a row */
 
 typedef struct npg_verdict_record {
@@ -102,7 +101,7 @@ static bool has_jumped(const npg_verdict *v, size_t at, double least, double *mo
 {
     if (at < 1 || at >= v->count) return false;
     *motion = motion_between(&v->records[at - 1], &v->records[at]);
-    *bound = fmax(JUMP * motion_around(v, at), least);
+    *bound = fmax(NPG_BEYOND * motion_around(v, at), least);
     return *motion > *bound;
 }
 
@@ -122,7 +121,7 @@ static void judge_jumps(npg_verdict *v, double least)
     double motion, bound;
     for (size_t i = 1; i < v->count; i++) {
         if (!has_jumped(v, i, least, &motion, &bound)) continue;
-        size_t odd = count_odd(v, i, bound / JUMP);
+        size_t odd = count_odd(v, i, bound / NPG_BEYOND);
         size_t first = !odd && v->records[i].index <= v->key ? i - 1 : i;
         for (size_t k = first; k < first + (odd ? odd : 1); k++)
             find_fault(&v->records[k], NPG_FAULT_JUMP, motion, bound);

@@ -4,7 +4,6 @@
 #include "fuse/fuse_internal.h"
 #include "geometry/geometry.h"
 
-#define VOTE_CELLS  4 /* sides of the cubes over which frames are counted, in cells */
 #define SIDE_LEAST  1e-5
 #define CELLS_LEAST 65 /* cubes on both sides of 0 never become one: 8 of them, facing 8 octants, and room */
 
@@ -90,7 +89,7 @@ npg_status npg_cells_add(npg_cells *c, const float at[3], const float facing[3],
         c->side *= 2;
     }
     add(find(&c->fine, npg_cell_key(at, facing, c->side)), point, normal, weight);
-    count_frame(find(&c->votes, npg_cell_key(at, facing, VOTE_CELLS * c->side)), frame);
+    count_frame(find(&c->votes, npg_cell_key(at, facing, NPG_VOTE_CELLS * c->side)), frame);
     return NPG_OK;
 }
 
@@ -131,7 +130,7 @@ double npg_cells_side(const npg_cells *cells)
 /* The frames around a cell: those of the cube of votes that it lies in. */
 static int64_t votes_of(const npg_cells *c, uint64_t key)
 {
-    for (int side = 1; side < VOTE_CELLS; side *= 2) key = npg_cell_key_of_double(key);
+    for (int side = 1; side < NPG_VOTE_CELLS; side *= 2) key = npg_cell_key_of_double(key);
     uint32_t at = npg_cell_find(&c->votes.table, key);
     return at == NPG_CELL_NONE ? 0 : c->votes.cells[at].frames;
 }

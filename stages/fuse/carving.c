@@ -8,7 +8,6 @@
 #include "pipeline/frame_box.h"
 #include "pipeline/parallel.h"
 
-#define GROW           1.26 /* of the side, where there are too many cells: half as many */
 #define PARTS_MOST     8
 #define GRID_BITS_MOST ((size_t)1 << 28) /* cells of the box around the band: 32 MiB of marks */
 
@@ -96,13 +95,14 @@ static npg_status bind(npg_carving *c, const npg_mesh *mesh)
     return npg_mesh_closest(c->hits, mesh, c->now, c->count);
 }
 
+/* Where there are too many cells, half as many. */
 npg_status npg_carving_open(npg_carving **out, const npg_mesh *mesh, double side, double band, size_t most)
 {
     npg_carving *c;
     *out = NULL;
     NPG_TRY(npg_alloc(&c, NPG_FOR_MESH, sizeof *c));
     npg_status status = NPG_OK;
-    for (size_t count = SIZE_MAX; count > most && !status; side *= GROW) {
+    for (size_t count = SIZE_MAX; count > most && !status; side *= cbrt(2)) {
         grid g = {0};
         c->side = side;
         count = 0;

@@ -30,29 +30,16 @@
 /* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
 #define POINTS_A_CELL 1    /* that a cell should average, from all frames ...                        */
 #define SIDE_LEAST    0.25 /* ... but for its side, in spacings of the keyframe's points             */
-#define FRAMES_SHARE  0.05 /* of all frames must have seen a place, ...                              */
 
-#define COLOUR_SIDE                                                                                          \
-    1 /* side of a cube that colours are averaged over, in spacings of the keyframe's points */
-#define COLOURS_MOST                                                                                         \
-    60000 /* such cubes; at 20 000 faces each vertex has six                                       */
-
-#define COLOUR_KEY  16  /* what the keyframe's colours count, those of frames far away being 1 */
-#define COLOUR_HALF 2.0 /* frames away at which they count half of that                       */
+#define COLOURS_MOST 60000 /* cubes; at 20 000 faces each vertex has six                          */
+#define COLOUR_KEY   16    /* what the keyframe's colours count, those of frames far away being 1 */
 
 /* Space that sensors saw empty, in spacings of the keyframe's points, each over eight of them. */
-#define EMPTY_SIDE   0.4    /* of a cell ...                                                      */
-#define EMPTY_BAND   3      /* ... within this of the surface                                     */
-#define EMPTY_MOST   300000 /* cells at most: larger ones then                                    */
-#define EMPTY_BIN    0.5    /* of a depth map, at the points' distance                            */
-#define EMPTY_MARGIN 0.3    /* that a place must be before what was seen ...                      */
-/* Of the frames that say anything of a place: what is left is how often a frame is wrongly followed. */
-#define CONTRADICTED 0.2
+#define EMPTY_SIDE 0.4    /* of a cell, and of a depth map's at the points' distance             */
+#define EMPTY_MOST 300000 /* cells at most: larger ones then                                    */
 
 /* While a reference that is one side of the body grows. */
-#define GROW_WEIGHT    0.25 /* of such a point, one on the surface being 1                              */
-#define DENSE_SPACINGS 1.5  /* of the keyframe's points, or ...                                         */
-#define DENSE_CELLS    4    /* ... sides of a cell, within which a place must have ...                  */
+#define GROW_WEIGHT 0.25 /* of such a point, one on the surface being 1                              */
 
 enum { FROM_KEY, FROM_ALL };
 
@@ -132,7 +119,7 @@ static npg_status median_dist(double *median, const cloud *c, bool is_growing)
 /* The surface slides along the body, the more the farther a frame is from the keyframe: colours blur. */
 static unsigned colour_weight(int64_t away)
 {
-    double weight = COLOUR_KEY / (1 + (double)llabs(away) / COLOUR_HALF);
+    double weight = COLOUR_KEY / (1 + (double)llabs(away));
     return weight > 1 ? (unsigned)lrint(weight) : 1;
 }
 
@@ -181,11 +168,11 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
                      .sensor_count = frame->sensor_count,
                      .points = c->points,
                      .point_count = c->count,
-                     .bin = EMPTY_BIN * s->spacing,
-                     .margin = EMPTY_MARGIN * s->spacing + NPG_WITHIN * s->noise};
+                     .bin = EMPTY_SIDE * s->spacing,
+                     .margin = EMPTY_SIDE * s->spacing + NPG_WITHIN * s->noise};
     if (!s->empty)
         NPG_TRY(npg_carving_open(&s->empty, facts->reference, EMPTY_SIDE * s->spacing,
-                                 EMPTY_BAND * s->spacing, EMPTY_MOST));
+                                 NPG_BEYOND * s->spacing, EMPTY_MOST));
     NPG_TRY(npg_free_space_open(&seen.space, frame, &facts->box));
     npg_status status = npg_carving_see(s->empty, s->skin, &seen);
     npg_free_space_close(&seen.space);
@@ -238,8 +225,7 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     double median;
     NPG_TRY(open_cloud(c, worker, frame));
     if (!s->skin) NPG_TRY(open_gathering(worker, c));
-    if (c->colours && !s->colours)
-        NPG_TRY(npg_colour_cells_open(&s->colours, COLOUR_SIDE * s->spacing, COLOURS_MOST));
+    if (c->colours && !s->colours) NPG_TRY(npg_colour_cells_open(&s->colours, s->spacing, COLOURS_MOST));
     NPG_TRY(judge(worker, frame->index, frame->vert_unit));
     npg_skin_pose(s->skin, frame->vert_unit);
     NPG_TRY(npg_skin_to_rest(s->skin, c->warped, c->points, c->normals, c->count));
@@ -287,7 +273,7 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
 {
     const state *s = npg_worker_state(worker);
     size_t most = npg_cells_count(s->cells);
-    double least = fmax(NPG_CONFIRMED, FRAMES_SHARE * (double)s->frames);
+    double least = fmax(NPG_CONFIRMED, NPG_FEW * (double)s->frames);
     /* What is new may be seen by the last frame that is reached alone. */
     bool is_one_enough = s->frames < 2 * NPG_CONFIRMED || npg_worker_facts(worker)->brief.is_growing;
     int64_t frames_least = is_one_enough ? 1 : (int64_t)least;
@@ -298,7 +284,7 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
     fused->key_noise_unit = s->noise;
     NPG_TRY(npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least));
     return s->grow_dist > 0
-               ? drop_scattered(fused, fmax(DENSE_SPACINGS * s->spacing, DENSE_CELLS * fused->spacing_unit))
+               ? drop_scattered(fused, fmax(NPG_SAMPLED * s->spacing, NPG_VOTE_CELLS * fused->spacing_unit))
                : NPG_OK;
 }
 
@@ -321,7 +307,7 @@ static npg_status collect_empty(const state *s, npg_fused *fused)
     NPG_TRY(npg_alloc_array(&fused->empty, NPG_FOR_MESH, most, 3 * sizeof(float)));
     fused->empty_side = npg_carving_side(s->empty);
     fused->empty_count = npg_carving_find(s->empty, fused->empty,
-                                          s->frames < 2 * NPG_CONFIRMED ? 1 : NPG_CONFIRMED, CONTRADICTED);
+                                          s->frames < 2 * NPG_CONFIRMED ? 1 : NPG_CONFIRMED, 1 - NPG_MOST);
     return NPG_OK;
 }
 

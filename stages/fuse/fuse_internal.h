@@ -12,8 +12,10 @@
  *     mean = sum w x / sum w,   normal = sum w n / |sum w n|
  *
  * Where the cubes would become too many they grow: each takes in its neighbours of twice the side.  What
- * fewer frames than asked for saw, counted over cubes of four times the side, is left out at the end.
+ * fewer frames than asked for saw, counted over cubes of NPG_VOTE_CELLS times the side, is left out at the end.
  * Equal input in equal order gives equal bits. */
+
+#define NPG_VOTE_CELLS 4
 
 typedef struct npg_cells npg_cells;
 

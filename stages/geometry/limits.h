@@ -9,11 +9,29 @@
  * to the surface, what lies farther off does not. */
 #define NPG_WITHIN 2.5
 
+/* Deviations, spacings, usual distances or motions: what is beyond so many is no chance. */
+#define NPG_BEYOND 3.0
+
+/* Times another: clearly more than it. */
+#define NPG_CLEARLY 2.0
+
+/* Spacings: surface that was sampled has a point within so many. */
+#define NPG_SAMPLED 2.0
+
+/* Spacings: sheets of points closer than that share the cells of an octree. */
+#define NPG_GAP 1.2
+
 /* Share of an area, or of a set, that is let pass without a word. */
 #define NPG_FEW 0.02
 
 /* More than half of those that say anything. */
 #define NPG_MAJORITY 0.5
+
+/* Most of a set: the rest may be wrongly followed, paired or turned. */
+#define NPG_MOST 0.8
+
+/* Of its measure: a solution that changes by less has settled. */
+#define NPG_SETTLED 0.01
 
 /* Of a diagonal: detail smaller than that is not told from noise; parts of one body without points between lie
  * no farther apart; and what is farther from every point is none of the body's. */

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "mesh/surface.h"
 #include "pipeline/clock.h"
 #include "pipeline/parallel.h"
@@ -15,7 +16,6 @@
 #define STRIDE_MOST  3  /* frames: the tracker must find from one to the next */
 
 #define DRAFT_FACES 3000
-#define DRAFT_DEPTH 7 /* of the octree */
 
 /* ---- which frames ---- */
 
@@ -50,7 +50,8 @@ static npg_status draft_from(npg_mesh **mesh, const npg_candidate_cloud *cloud, 
     NPG_TRY(
         npg_poisson_apart(mesh, &moved, cloud->fit, cloud->fit_normals, cloud->fit_count, spacing, settings));
     /* What sensors did not see is none of its surface. */
-    if (cloud->sensor_count) NPG_TRY(npg_mesh_trim(mesh, &share, cloud->fit, cloud->fit_count, 2 * spacing));
+    if (cloud->sensor_count)
+        NPG_TRY(npg_mesh_trim(mesh, &share, cloud->fit, cloud->fit_count, NPG_SAMPLED * spacing));
     NPG_TRY(npg_mesh_keep_main(mesh, &pieces, cloud->sensor_count ? HUGE_VAL : 1));
     NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
     NPG_TRY(npg_mesh_mend(mesh, &mending));
@@ -61,7 +62,7 @@ static npg_status make_draft(npg_mesh **mesh, const npg_candidate_cloud *cloud, 
                              const npg_poisson_settings *settings)
 {
     npg_poisson_settings quick = *settings;
-    if (quick.depth > DRAFT_DEPTH) quick.depth = DRAFT_DEPTH;
+    if (quick.depth > NPG_DRAFT_DEPTH) quick.depth = NPG_DRAFT_DEPTH;
     npg_status status = draft_from(mesh, cloud, spacing, &quick);
     if (status) npg_mesh_unref(mesh);
     return status;

@@ -12,9 +12,8 @@
 #define BLOCK      1024 /* points turned into unit coordinates at a time */
 
 /* Set by trial on captures from sensors: samba and two others, tests/bed/decisions.md. */
-#define SIDE_SPACINGS 2.0 /* of the first frame's points ...                                 */
-#define PLACES        8
-#define ASKED_MOST    20000 /* points for their spacing; a denser cloud's cells are NPG_DETAIL_SHARE */
+#define PLACES     8
+#define ASKED_MOST 20000 /* points for their spacing; a denser cloud's cells are NPG_DETAIL_SHARE */
 
 struct npg_extent {
     npg_frame_box box;
@@ -56,7 +55,7 @@ npg_status npg_extent_open(npg_extent **out, const npg_frame_box *box, const npg
     if (status) npg_extent_close(&e);
     *out = e;
     if (status) return status;
-    double side = box->scale * fmax(SIDE_SPACINGS * spacing, NPG_DETAIL_SHARE * box->diagonal);
+    double side = box->scale * fmax(NPG_SAMPLED * spacing, NPG_DETAIL_SHARE * box->diagonal);
     double most = (double)(GRID - 1) / 2; /* a grid that is shifted has one cell more */
     e->area_cells_per_unit = side * most > 1 ? 1 / side : most;
     return NPG_OK;

@@ -9,8 +9,8 @@
 #include "pipeline/memory.h"
 
 #define BATCH       4096
-#define TERMS       6
 #define SUPPORT_MIN 9 /* neighbours of the same sheet that a quadric takes */
+#define TERMS       6
 
 /* The quadric's height and slope at the point itself, from the neighbours of its side. */
 static void fit(float *out_point, float *out_normal, size_t i, const float *points, const float *normals,

@@ -7,16 +7,15 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
 
 /* By trial. */
 #define NEAR      48    /* points among which another side is looked for ...                    */
-#define THIN      1.2   /* ... no farther than this many spacings                               */
-#define AMONG     15    /* nearest points that ...                                              */
-#define PAIRS     5     /* ... so many neighbours on the same side are taken from               */
-#define ON_CIRCLE 0.7F  /* of one, and the other reflected halfway: 1 where both lie on a circle */
-#define STEEP     0.75F /* cosine of a normal and the edge: beyond, the edge is no surface      */
+#define ON_CIRCLE 0.7F  /* of one normal, and the other reflected halfway: 1 where both lie on a circle */
+#define STEEP     0.75F /* cosine of a normal and the edge: beyond, the edge is no surface */
+#define PAIRS     5     /* neighbours on the same side, of three times as many nearest points */
 
 /* Whether one of the near points is of another side, with the body in between. */
 static bool is_thin(const float *points, const float *normals, size_t i, const uint32_t *near,
@@ -49,12 +48,12 @@ static size_t find_edges(uint32_t (*edges)[2], const float *points, const float 
                          const uint32_t *near, const float *dist_sq, double spacing)
 {
     size_t found = 0, kept = 0;
-    float far_sq = (float)(THIN * THIN * spacing * spacing);
+    float far_sq = (float)(NPG_GAP * NPG_GAP * spacing * spacing);
     for (size_t i = 0; i < count; i++) {
         const uint32_t *row = near + NEAR * i;
         if (!is_thin(points, normals, i, row, dist_sq + NEAR * i, far_sq)) continue;
         size_t last = found + PAIRS;
-        for (size_t k = 0; k < AMONG && row[k] < count && found < last; k++) {
+        for (size_t k = 0; k < 3 * PAIRS && row[k] < count && found < last; k++) {
             if (row[k] == i || !is_edge(points, normals, i, row[k])) continue;
             edges[found][0] = (uint32_t)i < row[k] ? (uint32_t)i : row[k];
             edges[found++][1] = (uint32_t)i < row[k] ? row[k] : (uint32_t)i;

@@ -12,9 +12,8 @@
 #define NEIGHBOURS    48   /* in which a facing point is looked for */
 #define ACROSS        0.5f /* cosine of a normal and the way across the gap */
 #define SMOOTH_ROUNDS 3
-#define WIDE          1.2 /* a gap that survives, in spacings */
-#define BACK_ROUNDS   2   /* that the surface is drawn to its points */
-#define BACK_OVER     6   /* points around a vertex */
+#define BACK_ROUNDS   2 /* that the surface is drawn to its points */
+#define BACK_OVER     6 /* points around a vertex */
 
 /* ---- contact ---- */
 
@@ -75,7 +74,7 @@ static npg_status measure_pushes(float *push, const npg_gap_widening *widening)
     npg_status status = npg_neighbours_take(&near, &scratch, points, n, points, n, NEIGHBOURS);
     for (size_t i = 0; i < n && !status; i++)
         push[i] = push_of(i, near.index + NEIGHBOURS * i, near.dist_sq + NEIGHBOURS * i, points, normals, n,
-                          WIDE * widening->spacing);
+                          NPG_GAP * widening->spacing);
     for (int round = 0; round < SMOOTH_ROUNDS && !status; round++) {
         smooth(smoothed, push, near.index, normals, n);
         memcpy(push, smoothed, n * sizeof(float));

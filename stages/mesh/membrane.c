@@ -12,7 +12,7 @@
 #define SWEEPS_PUSHED 100  /* pushed and drawn, nothing settles */
 #define PUSH          0.3  /* of a cube's side */
 #define PUSHES_MOST   10   /* of a vertex, in a sweep */
-#define WELL_IN       0.9  /* the same: not at the border */
+#define WELL_IN       0.9  /* of a cube's value: not at the border */
 #define SETTLED       1e-5 /* of the unit box: a sweep that moves nothing farther ends it */
 
 /* How far the vertex went. */

@@ -414,10 +414,10 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
     return NPG_OK;
 }
 
-/* The raw reconstruction is the largest thing held.  Measured at depth 10: about 16 faces a point,
- * and 80 bytes a face with its share of vertices, normals and the links that mending needs. */
+/* The raw reconstruction is the largest thing held.  Measured at depth 10: about 16 faces a point (3 where
+ * those of all frames share the octree's cells), and 80 bytes a face with its share of vertices, normals and the links
+ * that mending needs. */
 #define RAW_FACES_PER_POINT 16
-#define RAW_FACES_PER_FUSED 6 /* points that lie closer share the octree's cells; measured: 3 */
 #define BYTES_PER_RAW_FACE  80
 
 static size_t mesh_memory(const npg_worker *worker, size_t *chunks_held)
@@ -425,7 +425,7 @@ static size_t mesh_memory(const npg_worker *worker, size_t *chunks_held)
     const npg_fused *fused = npg_worker_fact(worker, &npg_fact_fused);
     size_t faces = npg_worker_facts(worker)->point_count_max * RAW_FACES_PER_POINT;
     *chunks_held = 1;
-    if (fused && fused->count * RAW_FACES_PER_FUSED > faces) faces = fused->count * RAW_FACES_PER_FUSED;
+    if (fused && fused->count * NPG_FACES_PER_POINT > faces) faces = fused->count * NPG_FACES_PER_POINT;
     return faces * BYTES_PER_RAW_FACE;
 }
 

@@ -8,10 +8,9 @@
 #include "geometry/limits.h"
 
 /* By trial (tests/bed/decisions.md, "Noise in the reference"). */
-#define WIDTH      0.6  /* of their weight's bell, in mean edges                        */
+#define WIDTH      0.6  /* of their weight's bell, in mean edges */
+#define WEIGHT_MIN 1e-3 /* of all points that a face asks: below, it has none near it */
 #define STEPS      3    /* of the vertices                                              */
-#define RINGS      6    /* over which the way that all go together is taken back        */
-#define WEIGHT_MIN 1e-3 /* of all points that a face asks: below, it has none near it   */
 
 typedef struct work {
     npg_mesh *mesh; /* loan                                       */
@@ -120,7 +119,7 @@ static void take_back(work *w)
 {
     size_t count = 3 * w->mesh->vert_count;
     memcpy(w->smooth, w->moved, count * sizeof *w->smooth);
-    for (int ring = 0; ring < RINGS; ring++) average(w);
+    for (int ring = 0; ring < 2 * STEPS; ring++) average(w);
     for (size_t i = 0; i < count; i++) w->mesh->vert_pos[i] -= (float)w->smooth[i];
 }
 

@@ -7,9 +7,7 @@
 #include "geometry/limits.h"
 #include "pipeline/cost.h"
 
-#define POINTS_MAX    80000
-#define SEEN_SPACINGS 2.0 /* a place is seen when a point is nearer than this many spacings */
-#define KEY_SPACINGS  0.5 /* of the keyframe's points: all frames lie closer, but not everywhere */
+#define POINTS_MAX 80000
 
 /* Frames with more than POINTS_MAX give an even choice: the face budget could not hold more detail,
  * and Poisson's time goes with the points. */
@@ -62,7 +60,8 @@ static npg_status measure(npg_point_set *set, npg_worker *worker)
     npg_mesh_note_count(worker, "points_used", set->count);
     NPG_TRY(npg_cloud_spacing(&set->spacing, set->points, set->count));
     npg_mesh_note(worker, "point_spacing_unit", set->spacing);
-    set->seen_dist = SEEN_SPACINGS * fmax(set->spacing, KEY_SPACINGS * set->key_spacing);
+    set->seen_dist =
+        fmax(NPG_SAMPLED * set->spacing, set->key_spacing); /* all frames lie closer, but not everywhere */
     return NPG_OK;
 }
 

@@ -11,9 +11,6 @@
 #include "pipeline/child.h"
 #include "pipeline/frame_box.h"
 
-#define DISAGREEMENT_MAX 0.2 /* alternating normals have 0.5, a good cloud below 0.01 */
-#define BOX_GROWTH_MAX   2.5 /* the mesh's diagonal in diagonals of the points' box */
-
 /* ---- before ---- */
 
 static npg_status check_finite(const float *points, const float *normals, size_t n)
@@ -91,7 +88,7 @@ static npg_status check_points(const float *points, const float *normals, size_t
     NPG_TRY(check_extent(points, point_count));
     NPG_TRY(check_spread(normals, point_count));
     NPG_TRY(disagreement_of(&share, points, normals, point_count));
-    if (share > DISAGREEMENT_MAX)
+    if (share > 1 - NPG_MOST) /* alternating normals have 0.5, a good cloud below 0.01 */
         return npg_error(NPG_BAD_INPUT,
                          "the normals contradict each other: %.1f %% point against their neighbours",
                          100 * share);
@@ -161,7 +158,7 @@ static npg_status check_box(const npg_mesh *mesh, const float *points, size_t po
 {
     double growth =
         npg_points_diagonal(mesh->vert_pos, mesh->vert_count) / npg_points_diagonal(points, point_count);
-    if (growth > BOX_GROWTH_MAX || growth < 0.5)
+    if (growth > NPG_WITHIN || growth < 0.5)
         return npg_error(NPG_FAILED, "Poisson: the mesh's box has %.2f times the diagonal of the points' box",
                          growth);
     return NPG_OK;

@@ -8,14 +8,11 @@
 #include "geometry/limits.h"
 #include "pipeline/clock.h"
 
-#define NOISE_MIN         0.03 /* in spacings; clean clouds have 0 */
-#define FOLLOW_NOISE      0.08 /* of a frame's points, in spacings; curvature of few points is below */
+#define NOISY             0.08 /* in spacings; curvature of few points is below */
+#define NOISE_MIN         0.03 /* the same; clean clouds have 0 */
 #define SMOOTH_NEIGHBOURS 24
 #define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
-#define GROWING_DEPTH     8    /* of the octree while the reference grows: it is to carry frames, no more */
 #define UNSEEN_IS_A_SIDE  0.25 /* of the area: more than holes, a side that no camera saw */
-#define UNSEEN_IS_LEFT    0.05 /* the same of one that has grown: where the body goes on, out of sight */
-#define FLAT_SHARE        0.6  /* of seen_dist: surface farther than this from every point is drawn tight */
 
 typedef struct reconstruction { /* what is known while the mesh is made */
     npg_worker *worker;
@@ -41,7 +38,7 @@ static npg_status smooth(reconstruction *r)
                    "the points of %s are noisy (%.2g of the unit box): smoothed for the reconstruction",
                    p->is_fused ? "all frames" : "the keyframe", sigma);
     double key_noise = p->is_fused ? p->key_noise : sigma;
-    r->is_rough = key_noise > FOLLOW_NOISE * (p->is_fused ? p->key_spacing : p->spacing);
+    r->is_rough = key_noise > NOISY * (p->is_fused ? p->key_spacing : p->spacing);
     return npg_cloud_smooth(p->points, p->normals, p->count,
                             p->is_fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
 }
@@ -67,8 +64,8 @@ static npg_status draw_surface(reconstruction *r)
 {
     npg_point_set *p = r->set;
     npg_poisson_settings settings = r->settings->poisson;
-    if (npg_worker_facts(r->worker)->brief.is_growing && settings.depth > GROWING_DEPTH)
-        settings.depth = GROWING_DEPTH;
+    if (npg_worker_facts(r->worker)->brief.is_growing && settings.depth > NPG_DRAFT_DEPTH)
+        settings.depth = NPG_DRAFT_DEPTH;
     if (!p->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
     size_t moved;
@@ -124,7 +121,7 @@ static npg_status judge_unseen(reconstruction *r)
     const npg_facts *facts = npg_worker_facts(r->worker);
     const npg_point_set *p = r->set;
     int way = r->settings->unseen;
-    double share, side = facts->brief.growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
+    double share, side = facts->brief.growing_passes ? NPG_FEW : UNSEEN_IS_A_SIDE;
     NPG_TRY(npg_mesh_unseen(&share, r->mesh, p->points, p->count, p->seen_dist));
     r->trims_unseen =
         way == NPG_UNSEEN_TRIM || facts->brief.is_growing || (way != NPG_UNSEEN_KEEP && share > side);
@@ -178,7 +175,8 @@ static npg_status fair(reconstruction *r)
     npg_faired done;
     npg_mending mending;
     if (r->settings->unseen != NPG_UNSEEN_AUTO && r->settings->unseen != NPG_UNSEEN_CLOSE) return NPG_OK;
-    NPG_TRY(npg_mesh_fair(r->mesh, &done, p->points, p->count, FLAT_SHARE * p->seen_dist, p->empty));
+    NPG_TRY(
+        npg_mesh_fair(r->mesh, &done, p->points, p->count, NPG_GAP / NPG_SAMPLED * p->seen_dist, p->empty));
     npg_mesh_note_count(r->worker, "vertices_flattened", done.moved);
     if (p->empty) npg_mesh_note_count(r->worker, "vertices_pushed", done.pushed);
     return done.moved ? npg_mesh_mend(&r->mesh, &mending) : NPG_OK;

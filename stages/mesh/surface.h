@@ -42,6 +42,9 @@ void npg_fused_close(npg_fused **fused);
  * oriented normals, and may crash or exit: so the input is checked before, the process has limits, and the
  * answer is checked after. */
 
+/* Of the octree of a surface that is to carry frames, no more. */
+#define NPG_DRAFT_DEPTH 7
+
 typedef struct npg_poisson_settings {
     int depth;           /* of the octree, 10                     */
     double point_weight; /* of the screening term, 10             */

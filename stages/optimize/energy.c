@@ -5,11 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "geometry/limits.h"
 #include "pipeline/order.h"
 #include "pipeline/parallel.h"
 
 #define THREADS_MAX 8
-#define WIDTH       3    /* of the robust weight, in standard deviations of the frame */
 #define NOISE_LEAST 1e-5 /* units: points without noise still have a width */
 /* A frame's own pose counts as much as TRUST times its points where frames move smoothly without help (lambda
  * small), half at EVEN, and TRUST_LEAST where it takes neighbours in time to see the motion (lambda large):
@@ -168,7 +168,7 @@ static npg_status match_frames(void *user, size_t part)
     npg_energy *e = r->e;
     for (size_t t = part; t < r->count; t += e->threads) {
         npg_point_pull *pulls = e->system.pulls + t * (size_t)e->settings.points;
-        double width = WIDTH * fmax(fmax(e->spreads[t], e->noise), NOISE_LEAST);
+        double width = NPG_BEYOND * fmax(fmax(e->spreads[t], e->noise), NOISE_LEAST);
         NPG_TRY(npg_point_matcher_match(&e->matchers[part], pulls, &e->system.pull_counts[t], &e->frames[t],
                                         width));
     }

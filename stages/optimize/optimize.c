@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "geometry/limits.h"
 #include "kernels/kernels.h"
 #include "kernels/layout.h"
 #include "kernels/runtime/device.h"
@@ -316,8 +317,6 @@ static npg_status emit_done(npg_worker *worker)
 
 /* ---- states on disk ---- */
 
-#define SAVING_SHARE 0.02 /* of the time inside a long window, at most, for its states */
-
 static npg_status save_state(npg_worker *worker, bool is_inside)
 {
     state *s = npg_worker_state(worker);
@@ -332,11 +331,11 @@ static npg_status save_state(npg_worker *worker, bool is_inside)
     return NPG_OK;
 }
 
-/* Inside a window that takes long, and when the run is to stop. */
+/* Inside a window that takes long, for a small share of its time, and when the run is to stop. */
 static npg_status keep_inside(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    bool is_due = (npg_clock_s() - s->saved_s) * SAVING_SHARE >= s->saving_s || npg_worker_stopping(worker);
+    bool is_due = (npg_clock_s() - s->saved_s) * NPG_FEW >= s->saving_s || npg_worker_stopping(worker);
     return is_due ? save_state(worker, true) : NPG_OK;
 }
 

@@ -8,8 +8,7 @@
 #include "geometry/limits.h"
 #include "pipeline/frame_box.h"
 
-#define FLAT       1e-5 /* thickness over length below which a cloud is a plane     */
-#define CAP_ROUNDS 16   /* of looking for a side; set by trial                      */
+#define FLAT 1e-5 /* thickness over length below which a cloud is a plane     */
 
 npg_status npg_clean_finite(npg_frame *frame)
 {
@@ -132,7 +131,7 @@ npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
     npg_bounds_add_points(&bounds, frame->pos_local, frame->point_count);
     /* A guess to begin with: a surface as large as a square whose diagonal is that of the box. */
     double cell_side = npg_bounds_diagonal(&bounds) / sqrt(2.0 * (double)point_max);
-    for (int round = 0; round < CAP_ROUNDS; round++) {
+    for (int round = 0; round < NPG_ROUNDS_MOST; round++) {
         size_t count;
         NPG_TRY(first_of_cells(NULL, &count, frame, cell_side, point_max));
         if (count <= point_max) {

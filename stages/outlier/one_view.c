@@ -2,29 +2,19 @@
 #include "outlier/outlier_internal.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"
 
-/* All set by trial. */
-#define VIEW_CELLS_MAX 512 /* per side of the picture                                                */
-#define HIDDEN_MAX     0.1 /* share of hidden points in one view; a closed body has near one half    */
-#define DISTANCE       1.5 /* of a sensor that is looked for, in sizes of the cloud */
-/* First few points from few places: a cloud of many views has from all of them more that is hidden (bodies
- * 0.15; one view at most 0.05) ... */
-#define FEW_POINTS 2000
-#define FEW_PLACES 100
-/* ... then more of both (bodies 0.2, with noise and holes 0.09; one view 0.05), near the best so far. */
-#define MANY_POINTS   5000
-#define MANY_PLACES   400
-#define MANY_HIDDEN   0.06
-#define NEAR_COSINE   0.75 /* of the angle around the best of few */
-#define AS_GOOD       0.03 /* more hidden than from the best place, and still of the mean */
-#define MEAN_ROUNDS   5
-#define OUTLINE_VOTES 0.54 /* share of the outline that must be farther away */
-#define OUTLINE_STEP  4    /* cell widths: more between two cells is another part behind */
+#define VIEW_CELLS_MAX 512 /* per side of the picture */
+/* Of hidden points, by trial: one view has 0.05 at most, clouds of several 0.08 and more. */
+#define HIDDEN_MAX 0.06
+#define DISTANCE   1.5  /* of a sensor that is looked for, in sizes of the cloud */
+#define POINTS     5000 /* that are drawn, ... */
+#define PLACES     400  /* ... from so many places */
 
 typedef struct view { /* a pinhole picture toward the middle of the cloud */
     double right[3], up[3], forward[3], sensor[3];
@@ -131,36 +121,34 @@ static bool aim(view *v, const search *s, const double direction[3])
     return aim_view(v, &s->bounds, sensor, s->count);
 }
 
-/* Of the directions whose line is within an angle of `near` (NULL: all), each with its hidden share in shares
- * (INFINITY: not one of them); the best of them becomes s->best.  Returns its share. */
-static double try_places(search *s, double *shares, size_t place_count, const double *near)
+/* Each direction's hidden share in shares (INFINITY: no picture); the best of them becomes s->best.  Returns its
+ * share. */
+static double try_places(search *s, double *shares)
 {
-    double least = INFINITY, best[3] = {0};
-    for (size_t i = 0; i < place_count; i++) {
+    double least = INFINITY;
+    for (size_t i = 0; i < PLACES; i++) {
         double direction[3];
         view v;
-        npg_direction_spread(direction, i, place_count);
+        npg_direction_spread(direction, i, PLACES);
         shares[i] = INFINITY;
-        if (near && fabs(npg_vec3_dot(direction, near)) < NEAR_COSINE) continue;
         if (!aim(&v, s, direction)) continue;
         shares[i] = hidden_share(&v, s->cells, s->points, s->count);
         if (shares[i] >= least) continue;
         least = shares[i];
-        for (int a = 0; a < 3; a++) best[a] = direction[a];
+        memcpy(s->best, direction, sizeof s->best);
     }
-    for (int a = 0; a < 3; a++) s->best[a] = best[a];
     return least;
 }
 
-/* The mean line of the places that are nearly as good as the best, both sides of the cloud alike. */
-static void take_mean(search *s, const double *shares, size_t place_count, double least)
+/* The mean line of the places from which the cloud looks like one view, both sides of the cloud alike. */
+static void take_mean(search *s, const double *shares)
 {
-    for (int round = 0; round < MEAN_ROUNDS; round++) {
+    for (int round = 0; round < NPG_ROUNDS_MOST; round++) {
         double mean[3] = {0};
-        for (size_t i = 0; i < place_count; i++) {
-            double direction[3], weight = least + AS_GOOD - shares[i];
+        for (size_t i = 0; i < PLACES; i++) {
+            double direction[3], weight = HIDDEN_MAX - shares[i];
             if (!(weight > 0)) continue;
-            npg_direction_spread(direction, i, place_count);
+            npg_direction_spread(direction, i, PLACES);
             if (npg_vec3_dot(direction, s->best) < 0) weight = -weight;
             for (int a = 0; a < 3; a++) mean[a] += weight * direction[a];
         }
@@ -197,14 +185,14 @@ static void count_outline(const view *v, search *s, size_t *farther, size_t *nea
             ptrdiff_t inward = way % 2 ? (ptrdiff_t)stride : -(ptrdiff_t)stride;
             float difference = *here - here[2 * inward];
             bool is_outline = isnan(here[-inward]) && !isnan(here[inward]) && !isnan(difference) &&
-                              fabs((double)difference) < OUTLINE_STEP * v->cell_width;
+                              fabs((double)difference) < NPG_WITHIN * v->cell_width;
             *farther += is_outline && difference > 0;
             *nearer += is_outline && difference < 0;
         }
     }
 }
 
-/* Turn s->best to the side that the cloud bulges to; false where the outline does not tell. */
+/* Turn s->best to the side that the cloud bulges to; false where the outline does not tell: a lead that chance gives, too. */
 static bool choose_side(search *s)
 {
     size_t farther = 0, nearer = 0;
@@ -214,48 +202,38 @@ static bool choose_side(search *s)
     if (aim(&v, s, other)) count_outline(&v, s, &nearer, &farther);
     if (nearer > farther)
         for (int a = 0; a < 3; a++) s->best[a] = other[a];
-    double votes = (double)(farther > nearer ? farther : nearer);
-    return votes > OUTLINE_VOTES * (double)(farther + nearer);
+    return fabs((double)farther - (double)nearer) > NPG_BEYOND * sqrt((double)(farther + nearer));
 }
 
-static bool find_place(search *few, search *many)
+static bool find_place(search *s)
 {
-    double shares[MANY_PLACES];
-    if (!(try_places(few, shares, FEW_PLACES, NULL) < HIDDEN_MAX)) return false;
-    double least = try_places(many, shares, MANY_PLACES, few->best);
-    if (!(least < MANY_HIDDEN)) return false;
-    take_mean(many, shares, MANY_PLACES, least);
-    return choose_side(many);
-}
-
-static void take_few(search *s, float *room, const float *points, size_t n, size_t most)
-{
-    s->count = npg_points_spread(room, NULL, most, points, NULL, n);
-    s->points = room;
-    s->bounds = npg_bounds_empty();
-    npg_bounds_add_points(&s->bounds, room, s->count);
+    double shares[PLACES];
+    if (!(try_places(s, shares) < HIDDEN_MAX)) return false;
+    take_mean(s, shares);
+    return choose_side(s);
 }
 
 size_t npg_one_view_memory(void)
 {
-    return ((FEW_POINTS + MANY_POINTS) * 3 + MANY_POINTS * 2) * sizeof(float);
+    return POINTS * (3 + 2) * sizeof(float);
 }
 
 npg_status npg_one_view_find(bool *found, double sensor[3], const float *points, size_t n)
 {
-    search few, many;
+    search s = {.bounds = npg_bounds_empty()};
     float *room, *pictures = NULL;
     *found = false;
-    NPG_TRY(npg_alloc_array(&room, NPG_FOR_FRAMES, FEW_POINTS + MANY_POINTS, 3 * sizeof *room));
+    NPG_TRY(npg_alloc_array(&room, NPG_FOR_FRAMES, POINTS, 3 * sizeof *room));
     /* four points a cell (aim_view): never more cells than points */
-    npg_status status = npg_alloc_array(&pictures, NPG_FOR_FRAMES, MANY_POINTS, 2 * sizeof *pictures);
+    npg_status status = npg_alloc_array(&pictures, NPG_FOR_FRAMES, POINTS, 2 * sizeof *pictures);
     if (!status) {
-        take_few(&few, room, points, n, FEW_POINTS);
-        take_few(&many, room + 3 * FEW_POINTS, points, n, MANY_POINTS);
-        few.cells = many.cells = pictures;
-        few.counts = many.counts = pictures + MANY_POINTS;
-        *found = find_place(&few, &many);
-        if (*found) place_of(sensor, &many, many.best);
+        s.points = room;
+        s.count = npg_points_spread(room, NULL, POINTS, points, NULL, n);
+        npg_bounds_add_points(&s.bounds, room, s.count);
+        s.cells = pictures;
+        s.counts = pictures + POINTS;
+        *found = find_place(&s);
+        if (*found) place_of(sensor, &s, s.best);
     }
     npg_release(&room);
     npg_release(&pictures);

@@ -43,7 +43,7 @@ npg_status npg_clean_check(const npg_frame *frame);
 
 /* keep[i] = 0 for the isolated ones of points (N x 3, finite, N > 0), else 1: those whose mean distance to
  * their `neighbours` nearest points is more than `ratio` standard deviations above the mean of all points.
- * This is asked again of what is left until there are no more (8 rounds at most): far outliers raise mean
+ * This is asked again of what is left until there are no more (NPG_ROUNDS_MOST at most): far outliers raise mean
  * and deviation and so hide the near ones from the first round.  A round searches only where the one before
  * took a neighbour away.  Uses `threads` threads (0: one per core); the result does not depend on it.
  * NPG_MEMORY. */
@@ -70,7 +70,7 @@ npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t point
  * of places all round it, the mean of those from which least is hidden.  Seen from the other side as little
  * is hidden; a body bulges toward its sensor, so there what lies along its outline is farther away, and a
  * cloud for which that does not tell the sides apart has none.  Known to about 15 degrees (a dancer).
- * Cost: 200 000 points drawn for a cloud of many views, about 700 000 for one of one view.  NPG_MEMORY. */
+ * Cost: two million points drawn.  NPG_MEMORY. */
 npg_status npg_one_view_find(bool *found, double sensor[3], const float *points, size_t point_count);
 
 /* Bytes that it takes. */

@@ -5,9 +5,8 @@
 
 #include "geometry/geometry.h"
 
-#define TAU 1.0 /* times npg_cloud_spacing(), about three times the points apart: farther is no worse */
-#define CLEARLY                                                                                              \
-    0.91 /* times the other's figure, which is a tenth worse: tests/bed/decisions.md, "The judge" */
+/* Times the other's figure, which is a tenth worse: tests/bed/decisions.md, "The judge". */
+#define CLEARLY 0.91
 
 /* Coarse: what a finer one forgives shows. */
 static const npg_tracker_settings judge_tracking = {
@@ -20,7 +19,7 @@ struct npg_judging {
     const npg_candidate_cloud *own; /* the frame that the surface was made from */
     const npg_mesh *mesh;
     npg_judgement judgement;
-    double tau_sq;
+    double tau_sq; /* of the points' spacing: farther is no worse */
     npg_surface *surface;
     float *normals;   /* V x 3: of the posed surface                    */
     double *areas;    /* V: a third of those of the faces around        */
@@ -185,7 +184,7 @@ npg_status npg_judging_open(npg_judging **out, const npg_candidate_clouds *cloud
     j->clouds = clouds;
     j->own = &clouds->list[at];
     j->mesh = mesh;
-    j->tau_sq = TAU * TAU * settings->spacing_unit * settings->spacing_unit;
+    j->tau_sq = settings->spacing_unit * settings->spacing_unit;
     for (size_t i = 0; i < NPG_CHOICE_FRAMES; i++) j->judgement.of_frame[i] = (double)NAN;
     npg_status status = open_arrays(j);
     if (status) npg_judging_close(out);

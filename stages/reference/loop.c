@@ -8,8 +8,7 @@
 /* Share of a frame's points that must have a place on a surface that grows: a frame that sees much more is
  * wrongly followed, and adds limbs where they are not.  In the end half, in steps, after passes that reached no
  * more frames. */
-#define EXPLAINED_FIRST 0.8
-#define EXPLAINED_STEP  0.1
+#define EXPLAINED_STEP 0.1
 
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
 {
@@ -19,7 +18,7 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
                                            .takes_poses = true,
                                            .gathers_from = INT64_MIN,
                                            .gathers_to = INT64_MAX,
-                                           .explained_least = EXPLAINED_FIRST}};
+                                           .explained_least = NPG_MOST}};
     return loop->brief;
 }
 

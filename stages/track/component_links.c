@@ -1,5 +1,5 @@
 /* Component links: pieces join the first node's, nearest first. */
-#include "track/track_internal.h"
+#include "track/track.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -7,9 +7,9 @@
 #include "geometry/geometry.h"
 #include "pipeline/memory.h"
 #include "pipeline/order.h"
+#include "track/track_internal.h"
 
-#define LINKS_EACH 4 /* of a piece: they say how it is turned, too */
-#define NONE       UINT32_MAX
+#define NONE UINT32_MAX
 
 typedef struct joining {
     const float *node_pos;
@@ -69,10 +69,11 @@ static uint32_t nearest_outside(const joining *j, uint32_t piece)
     return best;
 }
 
+/* By as many links as nodes carry a vertex: they say how it is turned, too. */
 static npg_status link_piece(joining *j, uint32_t node)
 {
     uint32_t piece = j->piece[node];
-    for (int i = 0; i < LINKS_EACH && node != NONE; i++) {
+    for (int i = 0; i < NPG_GRAPH_BIND && node != NONE; i++) {
         uint32_t to = j->nearest[node];
         NPG_TRY(npg_grow(&j->links, &j->capacity, j->link_count + 1, sizeof *j->links, NPG_FOR_MESH));
         j->links[j->link_count][0] = node < to ? node : to;

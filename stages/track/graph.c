@@ -5,10 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "geometry/limits.h"
 #include "pipeline/order.h"
 #include "pipeline/parallel.h"
-
-#define REACH 2.5 /* radii within which a node carries a vertex */
 
 /* ---- distances along edges ---- */
 
@@ -158,7 +157,7 @@ static npg_status choose_nodes(npg_graph *graph, npg_arena *scratch, float *beyo
     for (size_t v = 0; v < mesh->vert_count; v++) {
         if (covered[v]) continue;
         memcpy(places + 3 * graph->node_count, mesh->vert_pos + 3 * v, 3 * sizeof(float));
-        walk_from(w, (uint32_t)v, (float)(REACH * graph->radius));
+        walk_from(w, (uint32_t)v, (float)(NPG_WITHIN * graph->radius));
         for (size_t i = 0; i < w->seen_count; i++) {
             uint32_t u = w->seen[i];
             if (w->dist[u] <= (float)graph->radius) covered[u] = 1;
@@ -218,7 +217,7 @@ npg_status npg_graph_open(npg_graph **out, const npg_mesh *mesh, size_t node_tar
         graph->vert_node[i] = UINT32_MAX;
     float *beyond = npg_arena_take(&scratch, mesh->vert_count, sizeof *beyond);
     if (!status) status = open_walk(&w, &scratch, mesh);
-    for (size_t v = 0; !status && v < mesh->vert_count; v++) beyond[v] = (float)(REACH * graph->radius);
+    for (size_t v = 0; !status && v < mesh->vert_count; v++) beyond[v] = (float)(NPG_WITHIN * graph->radius);
     if (!status) status = choose_nodes(graph, &scratch, beyond, &w, mesh);
     if (!status) status = connect_nodes(graph, &scratch);
     if (!status) turn_to_weights(graph, beyond);

@@ -7,11 +7,9 @@
 #include "pipeline/order.h"
 #include "track/track_internal.h"
 
-/* What is hidden for long drifts by what each frame adds, so a small part of each edge stays at rest; more of
- * it where several sensors leave little hidden, between parts that are seen.  By trial,
+/* What is hidden for long drifts by what each frame adds, so a small part of each edge stays at rest.  By trial,
  * tests/bed/decisions.md, one sensor and a body that turns. */
-#define PRIOR_ONE     0.95 /* before one sensor */
-#define PRIOR_SEVERAL 0.9
+#define PRIOR 0.95
 /* A link counts little where both ends are seen: a piece that has points goes where they are, and one that the
  * alignment has lost does not fly off. */
 #define LINK_SEEN 0.01
@@ -60,10 +58,8 @@ static void edge_in_pose(double edge[3], const npg_graph *graph, const double *p
     for (int i = 0; i < 3; i++) edge[i] = pj[i] * d[0] + pj[3 + i] * d[1] + pj[6 + i] * d[2];
 }
 
-void npg_prior_take(npg_occlusion_prior *prior, const npg_graph *graph, const npg_prior_poses *poses,
-                    size_t sensor_count)
+void npg_prior_take(npg_occlusion_prior *prior, const npg_graph *graph, const npg_prior_poses *poses)
 {
-    prior->share = sensor_count == 1 ? PRIOR_ONE : PRIOR_SEVERAL;
     for (size_t e = 0; e < 2 * prior->pair_count; e++) {
         uint32_t j = prior->pairs[e / 2][e % 2], k = prior->pairs[e / 2][1 - e % 2];
         double edge[3], far_edge[3] = {0}, far_weight = 0;
@@ -100,7 +96,7 @@ double npg_prior_edge(double edge[3], const npg_occlusion_prior *prior, const np
     double hidden = 1 - 0.5 * (double)(prior->seen[j] + prior->seen[k]);
     for (size_t i = 0; i < 3; i++) {
         double rest = (double)graph->node_pos[3 * (size_t)k + i] - (double)graph->node_pos[3 * (size_t)j + i];
-        edge[i] = rest + prior->share * hidden * ((double)prior->edges[e][i] - rest);
+        edge[i] = rest + PRIOR * hidden * ((double)prior->edges[e][i] - rest);
     }
     return prior->is_link[e / 2] ? fmax(LINK_SEEN, hidden) : 1;
 }

@@ -4,10 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "geometry/limits.h"
 #include "pipeline/order.h"
-
-#define ROUNDS 12
-#define KEPT   0.8 /* of the pairs: the nearest ones */
 
 npg_status npg_look_open(npg_look *look, const float *points, size_t point_count)
 {
@@ -66,13 +64,13 @@ static npg_status find_pairs(pairs *p, const npg_look *from, const npg_look *to,
     return npg_kdtree_nearest(to->tree, p->near, p->dist_sq, p->moved, from->count, 1, 1);
 }
 
-/* Squared distance that KEPT of the pairs do not exceed. */
+/* Squared distance that most of the pairs do not exceed. */
 static double bar_of(const pairs *p, size_t count)
 {
     double sorted[NPG_LOOK_POINTS];
     for (size_t i = 0; i < count; i++) sorted[i] = (double)p->dist_sq[i];
     qsort(sorted, count, sizeof *sorted, npg_order_double);
-    return sorted[(size_t)(KEPT * (double)(count - 1))];
+    return sorted[(size_t)(NPG_MOST * (double)(count - 1))];
 }
 
 static npg_status improve(npg_rigid *motion, pairs *p, const npg_look *from, const npg_look *to)
@@ -105,7 +103,7 @@ static npg_status settle(npg_rigid *motion, double *unlike, const npg_look *from
 {
     pairs p;
     double there, back;
-    for (int round = 0; round < ROUNDS; round++) NPG_TRY(improve(motion, &p, from, to));
+    for (int round = 0; round < NPG_ROUNDS_MOST; round++) NPG_TRY(improve(motion, &p, from, to));
     npg_rigid undone = inverse(motion);
     NPG_TRY(mean_between(&there, &p, from, to, motion));
     NPG_TRY(mean_between(&back, &p, to, from, &undone));

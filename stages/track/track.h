@@ -150,15 +150,13 @@ typedef struct npg_occlusion_prior {
     float (*edges)[3];    /* 2P: of each pair, from its first node and from its second */
     float *seen;          /* K: share of what a node carries that is seen, 0..1 */
     float *bound;         /* K, scratch */
-    double share;         /* PRIOR */
 } npg_occlusion_prior;
 
 /* Room for a graph's pairs and nodes, the arena's; all is seen.  NPG_MEMORY. */
 npg_status npg_prior_open(npg_occlusion_prior *prior, npg_arena *arena, const npg_graph *graph);
 
-/* The edges as they are in the poses that hold them, of a frame that so many sensors saw. */
-void npg_prior_take(npg_occlusion_prior *prior, const npg_graph *graph, const npg_prior_poses *poses,
-                    size_t sensor_count);
+/* The edges as they are in the poses that hold them. */
+void npg_prior_take(npg_occlusion_prior *prior, const npg_graph *graph, const npg_prior_poses *poses);
 
 /* Which nodes carry what is seen: is_seen (count) of these vertices of the graph. */
 void npg_prior_see(npg_occlusion_prior *prior, const npg_graph *graph, const uint32_t *verts,
@@ -244,6 +242,9 @@ typedef struct npg_tracker_effort {
     double width_unit; /* of the first step's robust weight: what may move */
     double along;      /* times the share of distances along the surface   */
 } npg_tracker_effort;
+
+/* Of a fit that starts from what a pass before found: near the usual one's end, in half of the steps. */
+npg_tracker_effort npg_tracker_again(const npg_tracker *tracker);
 
 /* Improve pose (K x 12) to explain the points, of which there is one at least.  Where it is known where they
  * were seen from, they are compared with what can be seen of the surface from there (visible.c), and points

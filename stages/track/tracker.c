@@ -19,11 +19,10 @@
 #define MOVE_MAX    0.15  /* units                                                            */
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface            */
 /* Set by trial, like those above. */
-#define SCHEDULE    1.5  /* stiffness and width are final after 2/3 of the steps; the last third settles */
-#define SETTLED     0.01 /* of the graph's radius: a step that moves no node farther ends the fit */
-#define PAIR_WIDTHS 3.0  /* samples farther than so many widths from every point have no pair: a hole */
-#define ONE_SIDE    20   /* times the stiffness where one sensor leaves half of the body to the edges */
-#define GRAIN       512  /* targets, samples or edges at a time: a thread's next piece of work */
+#define SCHEDULE 1.5 /* stiffness and width are final after 2/3 of the steps; the last third settles */
+#define ONE_SIDE 20  /* times the stiffness where one sensor leaves half of the body to the edges */
+#define AGAIN    2   /* times the final stiffness and width, where a fit starts near its end */
+#define GRAIN    512 /* targets, samples or edges at a time: a thread's next piece of work */
 
 struct npg_tracker {
     npg_arena arena; /* of all arrays that are not said to be loans */
@@ -313,7 +312,7 @@ static void set_targets(const step *s, size_t first, size_t last)
         for (size_t c = 0; c < 3 && s->normals; c++)
             facing += p.normal[c] * (double)t->target_normals[3 * i + c];
         if (facing < NPG_AGAINST) continue;
-        sums.explained += (double)hit->dist_sq <= PAIR_WIDTHS * PAIR_WIDTHS * s->width * s->width;
+        sums.explained += (double)hit->dist_sq <= NPG_BEYOND * NPG_BEYOND * s->width * s->width;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
         set_pull(term, t, &p, s->pose, 1 / (double)t->target_count, s->width);
@@ -351,7 +350,7 @@ static void set_sample(npg_block_term *term, const step *s, size_t i)
         p.target[c] = (double)s->cloud->points[3 * near + c];
         if (s->normals) facing += p.normal[c] * (double)s->normals[3 * near + c];
     }
-    bool is_far = (double)t->near_sq[i] > PAIR_WIDTHS * PAIR_WIDTHS * s->width * s->width;
+    bool is_far = (double)t->near_sq[i] > NPG_BEYOND * NPG_BEYOND * s->width * s->width;
     if (!t->is_empty[i] && (facing < NPG_AGAINST || is_far)) return;
     memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
     memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
@@ -562,6 +561,11 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
     return NPG_OK;
 }
 
+npg_tracker_effort npg_tracker_again(const npg_tracker *t)
+{
+    return (npg_tracker_effort){(t->settings.steps + 1) / 2, AGAIN, AGAIN * WIDTH_END, 1};
+}
+
 npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const npg_tracker_cloud *cloud,
                            const npg_prior_poses *poses, const npg_tracker_effort *effort)
 {
@@ -576,12 +580,12 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     step s = {.t = t, .pose = pose, .tree = tree, .cloud = cloud};
     if (!effort) effort = &usual;
     const npg_prior_poses start = {.pose = pose};
-    if (cloud->sensor_count) npg_prior_take(&t->prior, t->graph, poses ? poses : &start, cloud->sensor_count);
+    if (cloud->sensor_count) npg_prior_take(&t->prior, t->graph, poses ? poses : &start);
     t->along = fmin(1, t->settings.along * effort->along);
     while (tracked->steps < effort->steps && !status) {
         set_schedule(&s, tracked, effort);
         status = do_step(&s, tracked, pose);
-        if (s.is_settling && tracked->change < SETTLED * t->graph->radius) break;
+        if (s.is_settling && tracked->change < NPG_SETTLED * t->graph->radius) break;
     }
     npg_kdtree_close(&tree);
     return status;

@@ -94,13 +94,13 @@ static void hidden_edges_are_those_of_the_pose(void **state)
     scene s;
     (void)state;
     open_scene(&s);
-    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.bent}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.bent});
     see(&s, true);
     assert_true(bend(&s) < 1e-9);
     see(&s, false);
     double bent = bend(&s);
     assert_true(bent > 0.1);
-    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.rest}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.rest});
     assert_true(bend(&s) < 1e-3 * bent);
     /* turned and moved as a whole, a body is not bent */
     for (size_t k = 0; k < s.graph->node_count; k++) {
@@ -110,7 +110,7 @@ static void hidden_edges_are_those_of_the_pose(void **state)
             0, -1, 0, 1, 0, 0, 0, 0, 1, 0.3 - (double)g[1] - (double)g[0], (double)g[0] - (double)g[1]};
         memcpy(p, whole, sizeof whole);
     }
-    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.bent}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.bent});
     assert_true(bend(&s) < 1e-3 * bent);
     close_scene(&s);
 }
@@ -123,12 +123,12 @@ static void both_sides_have_a_say(void **state)
     open_scene(&s);
     assert_true(s.graph->node_count <= sizeof since / sizeof *since);
     see(&s, false);
-    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.bent}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){.pose = s.bent});
     double bent = bend(&s);
     for (size_t k = 0; k < s.graph->node_count; k++) since[k] = 3;
-    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){s.rest, s.bent, since}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){s.rest, s.bent, since});
     assert_true(fabs(bend(&s) / bent - 0.75) < 0.01);
-    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){s.bent, s.rest, since}, 1);
+    npg_prior_take(&s.prior, s.graph, &(npg_prior_poses){s.bent, s.rest, since});
     assert_true(fabs(bend(&s) / bent - 0.25) < 0.01);
     /* what was hidden until now has been so for one more frame, what is seen for none */
     npg_prior_count(&s.prior, since, since, s.graph->node_count);

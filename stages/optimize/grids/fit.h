@@ -137,9 +137,8 @@ double npg_weights_next(npg_weights *weights, int64_t index, double cd, bool has
 
 /* What the two solvers over a fit share (grids.c). */
 
-#define NPG_GRIDS_RATE_END                                                                                   \
-    0.1                    /* of windows' learning rates: those of the paper's own fit do not fall        */
-#define NPG_GRIDS_SPAN 0.8 /* of windows' time code: that of 1 is nearly that of 0; of the paper's own: 1 */
+#define NPG_GRIDS_RATE_END 0.1 /* of windows' learning rates: those of the paper's own fit do not fall */
+#define NPG_GRIDS_SPAN     0.8 /* of windows' time code: that of 1 is nearly that of 0; of the paper's own: 1 */
 
 /* What the time code is a function of: the absolute frame with a fixed period, the length of the first window,
  * so that frames which two windows share mean the same to both.  That window goes from 0 to span. */

@@ -3,11 +3,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "geometry/limits.h"
 #include "optimize/solver.h"
 #include "pipeline/parallel.h"
 
-#define BLOCKS    64   /* of vertices: sums are made block by block, so that threads don't matter */
-#define TOLERANCE 1e-2 /* of a solution                                                           */
+#define BLOCKS 64 /* of vertices: sums are made block by block, so that threads don't matter */
 
 typedef struct work {
     const npg_energy_system *s;
@@ -131,7 +131,7 @@ static npg_status iterate(work *w, npg_solved *solved, int64_t most, npg_solver_
     size_t count = 3 * s->frame_count * s->vert_count;
     int64_t *taken = &solved->steps;
     NPG_TRY(npg_parallel(move_blocks, w, w->threads)); /* by 0: the first preconditioned residual */
-    double start = sum_of(w->sums, BLOCKS), now = start, goal = TOLERANCE * TOLERANCE * start, share = 0;
+    double start = sum_of(w->sums, BLOCKS), now = start, goal = NPG_SETTLED * NPG_SETTLED * start, share = 0;
     for (*taken = 0; *taken < most && now > goal; ++*taken) {
         for (size_t i = 0; i < count; i++) w->direction[i] = w->image[i] + (float)share * w->direction[i];
         NPG_TRY(npg_parallel(multiply_frames, w, w->threads));
