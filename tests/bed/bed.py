@@ -278,6 +278,9 @@ def scale_file(path, found, scale):
     for number, name, text in found:
         at = lines[number - 1].index(name) + len(name)
         head, tail = lines[number - 1][:at], lines[number - 1][at:]
+        if tail.strip() == "\\":  # the number stands on the next line
+            lines[number] = lines[number].replace(text, scaled(text, scale), 1)
+            continue
         lines[number - 1] = head + tail.replace(text, scaled(text, scale), 1)
     path.write_text("\n".join(lines))
 

@@ -54,7 +54,10 @@ def read_constants(root):
         room = parts[0] if len(parts) > 1 else "shared"
         if room != "shared" and room not in ROOMS and path.name != "limits.h":
             continue
-        for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1):
+        lines = path.read_text(errors="replace").splitlines()
+        for number, line in enumerate(lines, 1):
+            if line.endswith("\\") and number < len(lines):
+                line = line[:-1] + lines[number]
             match = next(filter(None, (form.match(line) for form in FORMS)), None)
             if match and is_tuned(match[1], match[2]):
                 yield room, f"{path.relative_to(root)}:{number}", match[1], match[2]
