@@ -14,7 +14,8 @@
 
 /* Limits that stages keep to, where the costs depend on them. */
 #define NPG_START_POINTS_MOST 30000 /* of a surface that only carries the frames of a fusing pass           */
-#define NPG_FUSED_FRAME_MOST  40000 /* points of a frame: more add time, and nothing that cells could hold */
+#define NPG_POINTS_A_FACE     2 /* of the reference: what a frame may have at most, but not less than ... */
+#define NPG_FRAME_POINTS      40000 /* ... so many */
 
 #define NPG_COST_FUSED_POINTS 45000 /* fused points of a capture, as a rule; 34 000 to 62 000 were seen */
 
@@ -34,7 +35,7 @@ static inline double npg_cost_surface_s(double points)
  * fusion, fit and figures, where motion is easy to follow. */
 static inline double npg_cost_pass_s(double frames, double points)
 {
-    return 0.5 * frames * (0.62 + 36e-6 * fmin(points, NPG_FUSED_FRAME_MOST));
+    return 0.5 * frames * (0.62 + 36e-6 * fmin(points, NPG_FRAME_POINTS));
 }
 
 /* The network: multiply-adds x 2 of a vertex, a frame and an epoch, forward and twice as many backward.  40

@@ -380,6 +380,14 @@ npg_status npg_options_set_json(npg_options *options, const char *name, const js
     return apply_method(options, value, name);
 }
 
+double npg_options_number(const npg_options *options, const char *name, double otherwise)
+{
+    const char *text = npg_options_get(options, name);
+    char *end = NULL;
+    double value = text ? strtod(text, &end) : 0;
+    return text && end != text ? value : otherwise;
+}
+
 bool npg_options_is_set(const npg_options *options, const char *name)
 {
     size_t at;

@@ -120,6 +120,9 @@ npg_option_info npg_option_info_of(const npg_option *option, const char *stage);
 struct json_t;
 struct json_t *npg_options_json(const npg_options *options, const char *const *left_out);
 
+/* The value of an option as a number; `otherwise` where the chain has none of this name, or it is no number. */
+double npg_options_number(const npg_options *options, const char *name, double otherwise);
+
 /* Whether the user (not a preset, not the default) set it. */
 bool npg_options_is_set(const npg_options *options, const char *name);
 

@@ -24,6 +24,7 @@ const npg_stage *const npg_chain[] = {
 #define PAPER                                                                                                \
     {"align", "no"},                   /* from the reference */                                              \
         {"keyframe-choice", "paper"},  /* by score alone */                                                  \
+        {"poisson-depth", "10"},                                                                             \
         {"smooth", "no"},              /* the keyframe's points as they are */                               \
         {"unseen", "keep"},            /* as Poisson closed it */                                            \
         {"window", "-1"}               /* all frames at once, up to 60 */

@@ -27,9 +27,7 @@
 #include "reference/reference.h"
 #include "track/track.h"
 
-/* By trial, as all below: more to a cell costs detail, and fewer nothing but time. */
-#define POINTS_A_CELL 1    /* that a cell should average, from all frames ...                        */
-#define SIDE_LEAST    0.25 /* ... but for its side, in spacings of the keyframe's points             */
+#define SIDE_LEAST 0.25 /* of a cell, in spacings of the keyframe's points */
 
 #define COLOURS_MOST 60000 /* cubes; at 20 000 faces each vertex has six                          */
 #define COLOUR_KEY   16    /* what the keyframe's colours count, those of frames far away being 1 */
@@ -89,7 +87,7 @@ typedef struct cloud {
 
 static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame *frame)
 {
-    size_t most = frame->point_count < NPG_FUSED_FRAME_MOST ? frame->point_count : NPG_FUSED_FRAME_MOST;
+    size_t most = frame->point_count;
     c->points = npg_arena_take(&c->arena, most, 3 * sizeof *c->points);
     if (frame->normals) c->normals = npg_arena_take(&c->arena, most, 3 * sizeof *c->normals);
     c->warped = npg_arena_take(&c->arena, most, sizeof *c->warped);
@@ -185,16 +183,24 @@ static size_t most_cells(const npg_facts *facts)
     return points < NPG_FUSED_MOST ? points : NPG_FUSED_MOST;
 }
 
+/* A point of all frames to a cell, as more to one cost detail, but no smaller than what the faces can hold. */
+static double cell_side(const npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    double faces = npg_options_number(npg_worker_options(worker), "faces", HUGE_VAL);
+    double least = sqrt(npg_mesh_area(facts->reference) / (NPG_POINTS_A_FACE * faces));
+    return fmax(least, s->spacing * fmax(SIDE_LEAST, 1 / sqrt((double)facts->planned_count)));
+}
+
 static npg_status open_gathering(npg_worker *worker, const cloud *key)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    double per_frame = (double)POINTS_A_CELL / (double)facts->planned_count; /* of the points of one frame */
     s->key = facts->plan.key;
     NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
     NPG_TRY(npg_cloud_noise(&s->noise, key->points, key->normals, key->count));
-    NPG_TRY(npg_cells_open(&s->cells, s->spacing * fmin(1, fmax(SIDE_LEAST, sqrt(per_frame))),
-                           most_cells(facts)));
+    NPG_TRY(npg_cells_open(&s->cells, cell_side(worker), most_cells(facts)));
     NPG_TRY(npg_skin_open(&s->skin, facts->reference));
     if (facts->sensor_count_max && npg_skin_is_open(s->skin))
         s->grow_dist =
@@ -382,17 +388,38 @@ static npg_status begin(npg_worker *worker)
     return NPG_OK;
 }
 
+/* Handles of the keyframe's draft, with which others would be compared: a finer surface has small ones of noise. */
+static npg_status draft_handles(int64_t *handles, npg_worker *worker)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
+    const npg_candidate_cloud *own = &clouds->list[npg_candidate_clouds_find(clouds, facts->plan.key)];
+    npg_poisson_settings settings = npg_poisson_settings_of(npg_worker_options(worker));
+    npg_mesh *draft;
+    double spacing;
+    settings.should_stop = npg_worker_should_stop;
+    settings.user = worker;
+    NPG_TRY(npg_cloud_spacing(&spacing, own->points, own->point_count));
+    NPG_TRY(npg_mesh_draft(&draft, own->fit, own->fit_normals, own->fit_count, spacing, own->sensor_count > 0,
+                           &settings));
+    npg_status status = npg_mesh_handles(handles, draft);
+    npg_mesh_unref(&draft);
+    return status;
+}
+
 /* Whether another keyframe could do better than the one that is tried: parts that touch in it are joined, or points
  * are farther from its surface than their own would be. */
 static npg_status is_beatable(bool *beatable, npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    int64_t handles;
+    int64_t handles = 0;
     *beatable = false;
     if (!s->judging) return NPG_OK;
     const npg_judgement *found = npg_judging_found(s->judging);
-    NPG_TRY(npg_mesh_handles(&handles, npg_worker_facts(worker)->reference));
-    *beatable = handles > 0 || !npg_judged_least(found);
+    *beatable = !npg_judged_least(found);
+    if (!*beatable) NPG_TRY(npg_mesh_handles(&handles, npg_worker_facts(worker)->reference));
+    if (handles) NPG_TRY(draft_handles(&handles, worker));
+    *beatable |= handles > 0;
     json_object_update_new(npg_worker_report(worker),
                            json_pack("{sf sf}", "judged", found->mean, "judged_own", found->own));
     return NPG_OK;
@@ -516,8 +543,7 @@ static bool takes_part(const npg_worker *worker)
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
 {
     const npg_facts *facts = npg_worker_facts(worker);
-    size_t points =
-        facts->point_count_max < NPG_FUSED_FRAME_MOST ? facts->point_count_max : NPG_FUSED_FRAME_MOST;
+    size_t points = facts->point_count_max;
     *chunks_held = 1;
     size_t colours =
         npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? 0 : npg_colour_cells_memory(COLOURS_MOST);

@@ -211,15 +211,6 @@ static void finish_counts(npg_probe *probe)
 
 /* ---- what a run would take ---- */
 
-/* The value of a run's option as a number, or `otherwise` where it is none. */
-static double number_of(const npg_options *options, const char *name, double otherwise)
-{
-    const char *text = npg_options_get(options, name);
-    char *end = NULL;
-    double value = text ? strtod(text, &end) : 0;
-    return text && end != text ? value : otherwise;
-}
-
 static bool is_set_to(const npg_options *options, const char *name, const char *word)
 {
     const char *text = npg_options_get(options, name);
@@ -240,9 +231,9 @@ static double aligned_s(const npg_capture_facts *all, const npg_options *options
 /* The same of one that fits them by the network alone. */
 static double network_s(const npg_options *options, double vertex_frames, double cores)
 {
-    double flops =
-        npg_cost_decoder_flops(number_of(options, "width-1", 512), number_of(options, "width-2", 512));
-    return npg_cost_network_s(vertex_frames * number_of(options, "epochs", 250) * flops,
+    double flops = npg_cost_decoder_flops(npg_options_number(options, "width-1", 512),
+                                          npg_options_number(options, "width-2", 512));
+    return npg_cost_network_s(vertex_frames * npg_options_number(options, "epochs", 250) * flops,
                               cores * NPG_COST_CORE_FLOPS);
 }
 
@@ -255,9 +246,10 @@ static void estimate(npg_probe *probe, const npg_options *options)
     const double frames = (double)all->frames, most = (double)all->points_most;
     const double cores = fmax((double)sysconf(_SC_NPROCESSORS_ONLN), 1);
     /* a closed mesh has half as many vertices as faces; a run makes no more than 4 faces per point */
-    const double vertices = fmin(number_of(options, "faces", 20000), 4 * most) / 2;
+    const double vertices = fmin(npg_options_number(options, "faces", 20000), 4 * most) / 2;
     const bool is_aligned = is_set_to(options, "align", "yes");
-    double window = (double)npg_plan_window_asked((int64_t)number_of(options, "window", 0), all->frames);
+    double window =
+        (double)npg_plan_window_asked((int64_t)npg_options_number(options, "window", 0), all->frames);
     if (!(window > 0 && window < frames)) window = frames;
     all->vertices = (size_t)vertices;
     all->window = (size_t)window;

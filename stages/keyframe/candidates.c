@@ -15,8 +15,6 @@
 #define SAMPLE_LEAST 24 /* frames: with fewer none is left out */
 #define STRIDE_MOST  3  /* frames: the tracker must find from one to the next */
 
-#define DRAFT_FACES 3000
-
 /* ---- which frames ---- */
 
 void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, bool key_alone)
@@ -38,36 +36,6 @@ void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, b
     }
 }
 
-/* ---- the draft of a candidate ---- */
-
-static npg_status draft_from(npg_mesh **mesh, const npg_candidate_cloud *cloud, double spacing,
-                             const npg_poisson_settings *settings)
-{
-    size_t moved;
-    npg_pieces pieces;
-    npg_mending mending;
-    double share;
-    NPG_TRY(
-        npg_poisson_apart(mesh, &moved, cloud->fit, cloud->fit_normals, cloud->fit_count, spacing, settings));
-    /* What sensors did not see is none of its surface. */
-    if (cloud->sensor_count)
-        NPG_TRY(npg_mesh_trim(mesh, &share, cloud->fit, cloud->fit_count, NPG_SAMPLED * spacing));
-    NPG_TRY(npg_mesh_keep_main(mesh, &pieces, cloud->sensor_count ? HUGE_VAL : 1));
-    NPG_TRY(npg_mesh_decimate(mesh, DRAFT_FACES));
-    NPG_TRY(npg_mesh_mend(mesh, &mending));
-    return npg_mesh_make_normals(*mesh);
-}
-
-static npg_status make_draft(npg_mesh **mesh, const npg_candidate_cloud *cloud, double spacing,
-                             const npg_poisson_settings *settings)
-{
-    npg_poisson_settings quick = *settings;
-    if (quick.depth > NPG_DRAFT_DEPTH) quick.depth = NPG_DRAFT_DEPTH;
-    npg_status status = draft_from(mesh, cloud, spacing, &quick);
-    if (status) npg_mesh_unref(mesh);
-    return status;
-}
-
 /* ---- the choice ---- */
 
 typedef struct choosing {
@@ -86,8 +54,10 @@ static bool is_fatal(npg_status status)
 
 static npg_status try_one(const choosing *c, npg_candidate *one)
 {
+    const npg_candidate_cloud *cloud = &c->clouds->list[one->at];
     npg_mesh *draft;
-    NPG_TRY(make_draft(&draft, &c->clouds->list[one->at], c->judging.spacing_unit, c->settings));
+    NPG_TRY(npg_mesh_draft(&draft, cloud->fit, cloud->fit_normals, cloud->fit_count, c->judging.spacing_unit,
+                           cloud->sensor_count > 0, c->settings));
     npg_status status = npg_mesh_handles(&one->handles, draft);
     if (!status) status = npg_judge(&one->judgement, c->clouds, one->at, draft, &c->judging);
     one->is_followed = !status;

@@ -29,8 +29,8 @@ typedef struct mesh_state {
 /* clang-format off */
 static const npg_option mesh_options[] = {
     /* type         name              place                 default  least most  shown as or words */
-    NPG_KEY(INT,    "poisson-depth",  AT(depth),            "10",    4,  13,   NULL,
-        "Depth of the Poisson octree"),
+    NPG_KEY(INT,    "poisson-depth",  AT(depth),            "0",     0,  13,   NULL,
+        "Depth of the Poisson octree. 0: cells about as large as the faces asked for, which is 8 up to 65536 of them"),
     NPG_KEY(REAL,   "poisson-weight", AT(point_weight),     "10",    0,  1000, NULL,
         "How closely the Poisson surface follows the points"),
     NPG_KEY(FLAG,   "smooth",         AT(surface.smooth),   "yes",
@@ -51,9 +51,16 @@ static const npg_option mesh_options[] = {
     {0}};
 /* clang-format on */
 
+/* A body fills about as much of its box's side squared as it has surface, so sqrt(faces) cells to a side are as large as
+ * faces.  Of few faces the surface is fine all the same: they are decimated from it. */
+static int depth_for(double faces)
+{
+    return (int)fmax(NPG_DRAFT_DEPTH + 1, ceil(log2(faces) / 2));
+}
+
 static npg_poisson_settings poisson_settings(const mesh_state *s)
 {
-    return (npg_poisson_settings){.depth = (int)s->depth,
+    return (npg_poisson_settings){.depth = s->depth ? (int)s->depth : depth_for((double)s->surface.face_max),
                                   .point_weight = s->point_weight,
                                   .holds_apart = s->holds_apart,
                                   .time_limit_s = POISSON_TIME_S,

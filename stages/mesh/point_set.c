@@ -7,14 +7,11 @@
 #include "geometry/limits.h"
 #include "pipeline/cost.h"
 
-#define POINTS_MAX 80000
-
-/* Frames with more than POINTS_MAX give an even choice: the face budget could not hold more detail,
- * and Poisson's time goes with the points. */
+/* What only carries the frames of a fusing pass is made of an even choice: Poisson's time goes with the points. */
 static npg_status take_frame(npg_point_set *set, npg_worker *worker, const npg_frame *frame)
 {
     size_t n = frame->point_count;
-    size_t most = npg_worker_pass(worker) == NPG_PASS_FUSE ? NPG_START_POINTS_MOST : POINTS_MAX;
+    size_t most = npg_worker_pass(worker) == NPG_PASS_FUSE ? NPG_START_POINTS_MOST : n;
     set->given = n;
     set->count = n < most ? n : most;
     NPG_TRY(npg_alloc_array(&set->points, NPG_FOR_MESH, set->count, 3 * sizeof(float)));

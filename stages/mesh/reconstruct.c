@@ -44,8 +44,9 @@ static npg_status smooth(reconstruction *r)
 }
 
 /* Poisson through the points and what lies between those of thin parts. */
-static npg_status draw_through(reconstruction *r, size_t *moved, const npg_poisson_settings *settings)
+static npg_status draw_through(reconstruction *r, size_t *moved)
 {
+    const npg_poisson_settings *settings = &r->settings->poisson;
     npg_point_set *p = r->set;
     float *points, *normals;
     size_t count;
@@ -63,14 +64,11 @@ static npg_status draw_through(reconstruction *r, size_t *moved, const npg_poiss
 static npg_status draw_surface(reconstruction *r)
 {
     npg_point_set *p = r->set;
-    npg_poisson_settings settings = r->settings->poisson;
-    if (npg_worker_facts(r->worker)->brief.is_growing && settings.depth > NPG_DRAFT_DEPTH)
-        settings.depth = NPG_DRAFT_DEPTH;
     if (!p->normals) return npg_error(NPG_BAD_INPUT, "the keyframe has no normals");
     double since = npg_clock_s();
     size_t moved;
     NPG_TRY(smooth(r));
-    NPG_TRY(draw_through(r, &moved, &settings));
+    NPG_TRY(draw_through(r, &moved));
     npg_mesh_note_count(r->worker, "points_held_apart", moved);
     npg_mesh_note(r->worker, "poisson_s", npg_clock_s() - since);
     npg_mesh_note_count(r->worker, "faces_reconstructed", r->mesh->face_count);

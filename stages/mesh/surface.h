@@ -46,7 +46,7 @@ void npg_fused_close(npg_fused **fused);
 #define NPG_DRAFT_DEPTH 7
 
 typedef struct npg_poisson_settings {
-    int depth;           /* of the octree, 10                     */
+    int depth;           /* of the octree                         */
     double point_weight; /* of the screening term, 10             */
     bool holds_apart;    /* npg_poisson_apart(): parts that nearly touch */
     double time_limit_s;
@@ -71,6 +71,11 @@ npg_status npg_poisson(npg_mesh **mesh, const float *points, const float *normal
  * that were moved for it.  spacing: npg_cloud_spacing(). */
 npg_status npg_poisson_apart(npg_mesh **mesh, size_t *moved, const float *points, const float *normals,
                              size_t point_count, double spacing, const npg_poisson_settings *settings);
+
+/* Draft: a coarse surface with normals, as npg_poisson_apart() makes it of few cells, in its main pieces.
+ * is_side: sensors saw the points, and what they did not see is none of it.  The same errors. */
+npg_status npg_mesh_draft(npg_mesh **mesh, const float *points, const float *normals, size_t point_count,
+                          double spacing, bool is_side, const npg_poisson_settings *settings);
 
 /* Denoise.  N x 3 arrays; NPG_MEMORY.
  *

@@ -5,10 +5,12 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "geometry/geometry.h"
 #include "geometry/limits.h"
+#include "pipeline/cost.h"
 #include "pipeline/frame_box.h"
 
-#define FLAT 1e-5 /* thickness over length below which a cloud is a plane     */
+#define FLAT 1e-5 /* thickness over length below which a cloud is a plane */
 
 npg_status npg_clean_finite(npg_frame *frame)
 {
@@ -27,139 +29,102 @@ npg_status npg_clean_finite(npg_frame *frame)
     return NPG_OK;
 }
 
-/* ---- one point per cell ---- */
+/* ---- one point per place ---- */
 
-typedef struct grid { /* a table of cells by open addressing; entries are the first point of a cell */
+typedef struct places { /* a table by open addressing; entries are the first point at a place */
     const float *points;
-    double lo[3], scale; /* cell = floor((p - lo) * scale); scale 0: cells are exact places */
     uint32_t *table;
     size_t mask;
-} grid;
+} places;
 
-static void cell_of(int64_t cell[3], const grid *g, const float *p)
+static void place_of(uint32_t place[3], const float *p)
 {
     for (int a = 0; a < 3; a++) {
-        if (g->scale > 0) {
-            cell[a] = (int64_t)floor(((double)p[a] - g->lo[a]) * g->scale);
-        } else {
-            float value = p[a] + 0.0f; /* -0 and 0 are one place */
-            uint32_t bits;
-            memcpy(&bits, &value, sizeof bits);
-            cell[a] = bits;
-        }
+        float value = p[a] + 0.0f; /* -0 and 0 are one place */
+        memcpy(&place[a], &value, sizeof place[a]);
     }
 }
 
-/* Multiplies and shifts as in MurmurHash3's last step; any hash that spreads neighbouring cells will do. */
-static uint64_t hash_of(const int64_t cell[3])
+/* Multiplies and shifts as in MurmurHash3's last step; any hash that spreads neighbouring places will do. */
+static uint64_t hash_of(const uint32_t place[3])
 {
     uint64_t h = 0x9e3779b97f4a7c15u;
     for (int a = 0; a < 3; a++) {
-        h = (h ^ (uint64_t)cell[a]) * 0xff51afd7ed558ccdu;
+        h = (h ^ place[a]) * 0xff51afd7ed558ccdu;
         h ^= h >> 32;
     }
     return h;
 }
 
-/* True when point i is the first of its cell. */
-static bool is_first_of_cell(grid *g, uint32_t i)
+/* True when point i is the first at its place. */
+static bool is_first(places *all, uint32_t i)
 {
-    int64_t mine[3], theirs[3];
-    cell_of(mine, g, g->points + 3 * (size_t)i);
-    for (size_t at = hash_of(mine) & g->mask;; at = (at + 1) & g->mask) {
-        if (g->table[at] == UINT32_MAX) {
-            g->table[at] = i;
+    uint32_t mine[3], theirs[3];
+    place_of(mine, all->points + 3 * (size_t)i);
+    for (size_t at = hash_of(mine) & all->mask;; at = (at + 1) & all->mask) {
+        if (all->table[at] == UINT32_MAX) {
+            all->table[at] = i;
             return true;
         }
-        cell_of(theirs, g, g->points + 3 * (size_t)g->table[at]);
+        place_of(theirs, all->points + 3 * (size_t)all->table[at]);
         if (!memcmp(mine, theirs, sizeof mine)) return false;
     }
 }
 
-/* keep[i] (may be NULL) = point i is the first of its cell; *count of those.
- * Stops early beyond count_max. */
-static npg_status first_of_cells(uint8_t *keep, size_t *count, const npg_frame *frame, double side,
-                                 size_t count_max)
+/* keep[i] = point i is the first at its place; *count of those. */
+static npg_status mark_first(uint8_t *keep, size_t *count, const npg_frame *frame)
 {
-    grid g = {.points = frame->pos_local, .scale = side > 0 ? 1 / side : 0};
-    npg_bounds bounds = npg_bounds_empty();
+    places all = {.points = frame->pos_local};
     size_t size = 64, n = frame->point_count;
-    size_t most = n < count_max ? n : count_max + 1;
-    npg_bounds_add_points(&bounds, frame->pos_local, n);
-    memcpy(g.lo, bounds.lo, sizeof g.lo);
-    while (size < 2 * most) size *= 2; /* at most half full, so that a free place is near */
+    while (size < 2 * n) size *= 2; /* at most half full, so that a free place is near */
     *count = 0;
-    NPG_TRY(npg_alloc_array(&g.table, NPG_FOR_FRAMES, size, sizeof *g.table));
-    memset(g.table, 0xff, size * sizeof *g.table);
-    g.mask = size - 1;
-    for (size_t i = 0; i < n && *count <= count_max; i++) {
-        bool is_first = is_first_of_cell(&g, (uint32_t)i);
-        if (keep) keep[i] = is_first;
-        *count += is_first;
-    }
-    npg_release(&g.table);
+    NPG_TRY(npg_alloc_array(&all.table, NPG_FOR_FRAMES, size, sizeof *all.table));
+    memset(all.table, 0xff, size * sizeof *all.table);
+    all.mask = size - 1;
+    for (size_t i = 0; i < n; i++) *count += keep[i] = is_first(&all, (uint32_t)i);
+    npg_release(&all.table);
     return NPG_OK;
 }
 
-static npg_status keep_first_of_cells(npg_frame *frame, size_t *dropped, double side)
+npg_status npg_clean_duplicates(npg_frame *frame)
 {
     uint8_t *keep;
     size_t count, before = frame->point_count;
     if (before >= UINT32_MAX) return npg_error(NPG_BAD_INPUT, "%zu points in one frame", before);
     NPG_TRY(npg_alloc(&keep, NPG_FOR_FRAMES, before));
-    npg_status status = first_of_cells(keep, &count, frame, side, before);
+    npg_status status = mark_first(keep, &count, frame);
     if (!status && count < before) npg_frame_keep(frame, keep);
-    if (!status) *dropped += before - count;
+    if (!status) frame->cleaning.duplicate += before - count;
     npg_release(&keep);
     return status;
 }
 
-npg_status npg_clean_duplicates(npg_frame *frame)
+/* ---- no more than are of use ---- */
+
+size_t npg_clean_point_max(double asked, double face_max)
 {
-    return keep_first_of_cells(frame, &frame->cleaning.duplicate, 0);
+    return asked > 0 ? (size_t)asked : (size_t)fmax(NPG_POINTS_A_FACE * face_max, NPG_FRAME_POINTS);
 }
 
-/* The number of cells that a surface takes goes with the inverse square of their side: each round uses that
- * to come nearer, aiming at 80 % of the most, and takes the geometric mean of a side with too many cells and
- * one with few enough where the estimate leaves that interval. */
-npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max)
+/* By their order, not one of each cell: the cells at the fringe of noise hold fewer points, which would all stay. */
+npg_status npg_clean_cap(npg_frame *frame, size_t point_max)
 {
-    npg_bounds bounds = npg_bounds_empty();
-    double too_small = 0, enough = 0;
-    *side = 0;
-    if (!point_max || frame->point_count <= point_max) return NPG_OK;
-    npg_bounds_add_points(&bounds, frame->pos_local, frame->point_count);
-    /* A guess to begin with: a surface as large as a square whose diagonal is that of the box. */
-    double cell_side = npg_bounds_diagonal(&bounds) / sqrt(2.0 * (double)point_max);
-    for (int round = 0; round < NPG_ROUNDS_MOST; round++) {
-        size_t count;
-        NPG_TRY(first_of_cells(NULL, &count, frame, cell_side, point_max));
-        if (count <= point_max) {
-            enough = cell_side;
-            if (2 * count > point_max) break;
-        } else {
-            too_small = cell_side;
-        }
-        double guess = count > point_max ? 1.5 * cell_side
-                                         : cell_side * sqrt((double)(count + 1) / (0.8 * (double)point_max));
-        bool between = guess > too_small && (!(enough > 0) || guess < enough);
-        cell_side = between ? guess : sqrt(too_small * enough);
-    }
-    while (!(enough > 0)) { /* ends: one cell holds all */
-        size_t count;
-        cell_side *= 2;
-        NPG_TRY(first_of_cells(NULL, &count, frame, cell_side, point_max));
-        if (count <= point_max) enough = cell_side;
-    }
-    *side = enough;
-    return keep_first_of_cells(frame, &frame->cleaning.thinned, enough);
+    uint8_t *keep;
+    size_t before = frame->point_count;
+    if (before <= point_max) return NPG_OK;
+    NPG_TRY(npg_alloc(&keep, NPG_FOR_FRAMES, before));
+    for (size_t i = 0; i < point_max; i++) keep[npg_spread_index(i, point_max, before)] = 1;
+    npg_frame_keep(frame, keep);
+    frame->cleaning.thinned += before - point_max;
+    npg_release(&keep);
+    return NPG_OK;
 }
 
-npg_status npg_clean_points(npg_frame *frame, double *side, size_t point_max)
+npg_status npg_clean_points(npg_frame *frame, size_t point_max)
 {
     NPG_TRY(npg_clean_finite(frame));
     NPG_TRY(npg_clean_duplicates(frame));
-    return npg_clean_cap(frame, side, point_max);
+    return npg_clean_cap(frame, point_max);
 }
 
 /* ---- is it a body? ---- */

@@ -47,8 +47,9 @@ static const npg_option outlier_options[] = {
         "repeated until it finds no more"),
     NPG_KEY(REAL,   "outlier-ratio", AT(ratio),         "5",      0.5,  100, NULL,
         "Standard deviations above the mean at which a point is isolated"),
-    NPG_KEY(INT,    "points-max",    AT(point_max),     "250000", 1000, 4e9, NULL,
-        "Thin frames with more points than this, with a warning"),
+    NPG_KEY(INT,    "points-max",    AT(point_max),     "0",      0,    4e9, NULL,
+        "Thin frames with more points than this, evenly by their order. 0: twice the faces, and 40000 at least; more "
+        "take time, and the reference can't hold them"),
     NPG_ROW_CHOICE( "normals",       AT(normals),       "auto",   "auto|estimate|given",
         "Where normals come from. Given ones are checked and mended; auto: given where there are any, else "
         "estimated"),
@@ -86,7 +87,10 @@ static void outlier_uninit(npg_worker *worker)
 
 static npg_status outlier_init(npg_worker *worker)
 {
-    return parse_sensor(npg_worker_state(worker));
+    outlier_state *s = npg_worker_state(worker);
+    s->point_max = (int64_t)npg_clean_point_max((double)s->point_max,
+                                                npg_options_number(npg_worker_options(worker), "faces", 0));
+    return parse_sensor(s);
 }
 
 /* Every pass cleans frames again that are not kept; only the first one that brings them reports what it did:
@@ -103,15 +107,8 @@ static bool comes_first(npg_worker *worker, const npg_frame *frame)
 static npg_status clean_points(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
-    size_t read = frame->point_count;
-    double side;
-    frame->cleaning = (npg_cleaning){.read = read};
-    NPG_TRY(npg_clean_points(frame, &side, (size_t)s->point_max));
-    if (side > 0 && comes_first(worker, frame))
-        npg_worker_warn(worker, false, frame->number,
-                        "%zu points are more than points-max %lld: thinned to %zu, one per cube of side %g",
-                        read, (long long)s->point_max, frame->point_count, side);
-    return NPG_OK;
+    frame->cleaning = (npg_cleaning){.read = frame->point_count};
+    return npg_clean_points(frame, (size_t)s->point_max);
 }
 
 /* ---- normals ---- */

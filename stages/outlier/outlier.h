@@ -12,4 +12,7 @@
  * deviations (0: none is).  keep: the caller's to release; NULL without points.  NPG_MEMORY. */
 npg_status npg_frame_clean(npg_frame *frame, uint8_t **keep, size_t point_max, double ratio);
 
+/* The most points of a frame that a run uses: those asked for (0: what a reference of face_max faces can hold). */
+size_t npg_clean_point_max(double asked, double face_max);
+
 #endif

@@ -26,12 +26,11 @@ npg_status npg_clean_finite(npg_frame *frame);
 /* Of points at exactly one place keep the first. */
 npg_status npg_clean_duplicates(npg_frame *frame);
 
-/* Thin by cells until at most point_max points are left (more than half of that, unless the cloud is stranger
- * than a surface).  *side is the side of the cells, 0 when there was nothing to do. */
-npg_status npg_clean_cap(npg_frame *frame, double *side, size_t point_max);
+/* Of more than point_max points keep so many, evenly by their order. */
+npg_status npg_clean_cap(npg_frame *frame, size_t point_max);
 
 /* These three, in this order. */
-npg_status npg_clean_points(npg_frame *frame, double *side, size_t point_max);
+npg_status npg_clean_points(npg_frame *frame, size_t point_max);
 
 /* NPG_BAD_INPUT when there are fewer than 16 points, or all lie in one place, on one line or on one plane. */
 npg_status npg_clean_check(const npg_frame *frame);

@@ -169,9 +169,8 @@ npg_status npg_isolated_drop(npg_frame *const *frames, size_t count, int neighbo
 
 npg_status npg_frame_clean(npg_frame *frame, uint8_t **keep, size_t point_max, double ratio)
 {
-    double side;
     *keep = NULL;
-    NPG_TRY(npg_clean_points(frame, &side, point_max));
+    NPG_TRY(npg_clean_points(frame, point_max));
     if (!frame->point_count) return NPG_OK;
     NPG_TRY(npg_alloc(keep, NPG_FOR_FRAMES, frame->point_count));
     memset(*keep, 1, frame->point_count);

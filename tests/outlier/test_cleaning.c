@@ -61,19 +61,22 @@ static void too_many_points_are_thinned(void **state)
 {
     (void)state;
     npg_frame frame;
-    double side;
-    for (int far = 0; far < 2; far++) {
-        open_frame(&frame, 400000, 4);
-        if (far) shape_put(frame.pos_local, 1e6, -1e6, 1e6); /* a stray point must not coarsen the rest */
-        assert_int_equal(npg_clean_cap(&frame, &side, 20000), NPG_OK);
-        assert_true(frame.point_count <= 20000 && frame.point_count > 10000);
-        assert_true(side > 0.005 && side < 0.2);
-        assert_int_equal(frame.point_count + frame.cleaning.thinned, 400000);
-        size_t left = frame.point_count;
-        assert_int_equal(npg_clean_cap(&frame, &side, 20000), NPG_OK);
-        assert_true(side == 0 && frame.point_count == left);
-        npg_frame_clear(&frame);
+    open_frame(&frame, 50001, 4);
+    for (size_t i = 0; i < frame.point_count; i++) shape_put(frame.pos_local + 3 * i, (double)i, 0, 0);
+    for (int again = 0; again < 2; again++) {
+        assert_int_equal(npg_clean_cap(&frame, 20000), NPG_OK);
+        assert_int_equal(frame.point_count, 20000);
+        assert_int_equal(frame.cleaning.thinned, 30001);
     }
+    for (size_t i = 0; i + 1 < frame.point_count;
+         i++) { /* evenly: no two that were beside each other, no gap */
+        double step = (double)(frame.pos_local[3 * (i + 1)] - frame.pos_local[3 * i]);
+        assert_true(step == 2 || step == 3);
+    }
+    npg_frame_clear(&frame);
+    assert_int_equal(npg_clean_point_max(0, 20000), npg_clean_point_max(0, 100));
+    assert_int_equal(npg_clean_point_max(0, 100000), 200000);
+    assert_int_equal(npg_clean_point_max(1000, 100000), 1000);
 }
 
 static npg_status drop_isolated(npg_frame *frame)
@@ -182,12 +185,11 @@ static void refused_memory_is_survived(void **state)
     size_t before = npg_memory_used(), refused = 0;
     for (uint64_t n = 1;; n++) {
         npg_frame frame;
-        double side;
         open_frame(&frame, 3000, 9);
         npg_memory_fail_at(n, true);
         npg_status status = npg_clean_finite(&frame);
         if (!status) status = npg_clean_duplicates(&frame);
-        if (!status) status = npg_clean_cap(&frame, &side, 1000);
+        if (!status) status = npg_clean_cap(&frame, 1000);
         if (!status) status = drop_isolated(&frame);
         npg_memory_fail_at(0, false);
         npg_frame_clear(&frame);

@@ -67,9 +67,9 @@ static npg_status place_points(npg_view_frames *frames, npg_frame *cloud, const 
     const json_t *options = npg_view_run_options(frames->part);
     const char *drops = json_string_value(json_object_get(options, "outliers"));
     double ratio = drops && !strcmp(drops, "no") ? 0 : npg_view_number(options, "outlier-ratio", 5);
+    double most = npg_view_number(options, "points-max", 0), faces = npg_view_number(options, "faces", 0);
     uint8_t *keep;
-    npg_status status =
-        npg_frame_clean(cloud, &keep, (size_t)npg_view_number(options, "points-max", 250000), ratio);
+    npg_status status = npg_frame_clean(cloud, &keep, npg_clean_point_max(most, faces), ratio);
     if (!status)
         status = npg_arena_grow(&frames->arena, &frames->points, &frames->point_capacity, cloud->point_count,
                                 3 * sizeof *frames->points);
