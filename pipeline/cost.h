@@ -14,8 +14,8 @@
 
 /* Limits that stages keep to, where the costs depend on them. */
 #define NPG_START_POINTS_MOST 30000 /* of a surface that only carries the frames of a fusing pass           */
-#define NPG_POINTS_A_FACE     2 /* of the reference: what a frame may have at most, but not less than ... */
-#define NPG_FRAME_POINTS      40000 /* ... so many */
+#define NPG_POINTS_A_FACE     2     /* points of a frame for each face of the reference, at most, but ... */
+#define NPG_FRAME_POINTS      40000 /* ... so many in any case */
 
 #define NPG_COST_FUSED_POINTS 45000 /* fused points of a capture, as a rule; 34 000 to 62 000 were seen */
 

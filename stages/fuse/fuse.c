@@ -183,16 +183,6 @@ static size_t most_cells(const npg_facts *facts)
     return points < NPG_FUSED_MOST ? points : NPG_FUSED_MOST;
 }
 
-/* A point of all frames to a cell, as more to one cost detail, but no smaller than what the faces can hold. */
-static double cell_side(const npg_worker *worker)
-{
-    const state *s = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    double faces = npg_options_number(npg_worker_options(worker), "faces", HUGE_VAL);
-    double least = sqrt(npg_mesh_area(facts->reference) / (NPG_POINTS_A_FACE * faces));
-    return fmax(least, s->spacing * fmax(SIDE_LEAST, 1 / sqrt((double)facts->planned_count)));
-}
-
 static npg_status open_gathering(npg_worker *worker, const cloud *key)
 {
     state *s = npg_worker_state(worker);
@@ -200,7 +190,8 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     s->key = facts->plan.key;
     NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
     NPG_TRY(npg_cloud_noise(&s->noise, key->points, key->normals, key->count));
-    NPG_TRY(npg_cells_open(&s->cells, cell_side(worker), most_cells(facts)));
+    double side = fmax(SIDE_LEAST, 1 / sqrt((double)facts->planned_count)); /* for a point of all frames */
+    NPG_TRY(npg_cells_open(&s->cells, side * s->spacing, most_cells(facts)));
     NPG_TRY(npg_skin_open(&s->skin, facts->reference));
     if (facts->sensor_count_max && npg_skin_is_open(s->skin))
         s->grow_dist =

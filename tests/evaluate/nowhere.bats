@@ -42,7 +42,7 @@ shares() { # OUT
 @test "a ball beside it in the reference: the frame is bad, and says why" {
     run_it ball --reference with_ball.obj || [ "$code" -eq 7 ]
     [ "$code" -eq 7 ]
-    shares ball | awk '{ print } NR == 1 && ($1 < 0.02 || $1 > 0.15) { exit 1 }'
+    shares ball | awk '{ print } NR == 1 && ($1 < 0.01 || $1 > 0.15) { exit 1 }'
     head -n 1 ball/frames.jsonl | grep -q '"fault":"nowhere"'
     grep -q "below the bar: share of the surface where sensors saw that nothing is, in %, is [0-9.]*, the bar 1" ball.log
     run_it lenient --reference with_ball.obj --bars invented=100,unsupported=100,nowhere=20
