@@ -13,6 +13,7 @@
 #define POINTS_LOST 1.1  /* ... its points' distances alone, which holes do not raise                 */
 #define LEVEL_LEAST 1e-6 /* square units: what is below does not matter                                 */
 #define BETTER      0.95 /* times a frame's Chamfer distance: what a new pose must reach                */
+#define SWEEPS      5    /* at most                                                                     */
 #define ALIKE       3    /* frames whose points look alike that are started from                        */
 #define VAIN_MOST   4    /* lost frames in a row that no start finds: the reference does not fit        */
 #define WORSE       (2 - BETTER) /* what the way back may have, for what it says of the rest */
@@ -284,7 +285,7 @@ static npg_status open_recovery(recovery *r, npg_arena *scratch)
 static npg_status run_sweeps(recovery *r)
 {
     bool is_found = true;
-    for (int sweep = 0; sweep < NPG_ROUNDS_MOST && is_found; sweep++) {
+    for (int sweep = 0; sweep < SWEEPS && is_found; sweep++) {
         set_levels(r);
         size_t lost = list_lost(r);
         if (!sweep) r->result->lost = (int64_t)lost;

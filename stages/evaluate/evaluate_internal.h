@@ -44,8 +44,8 @@ void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float
  * reach = max(NPG_BEYOND spacings of the points on the surface, NPG_DETAIL_SHARE of the reference's diagonal), with noise
  * 2 NPG_WITHIN times the median distance of the points, but no more than twice as far; the places are the largest ones.
  *
- * What sampling can explain is nothing: a place of fewer than NPG_PATCH points, and one on the surface
- * where fewer than NPG_PATCH points would be expected or that has fewer than NPG_AROUND vertices' share of the area.
+ * What sampling can explain is nothing: a place of fewer than 12 points, and one on the surface
+ * where fewer than 20 points would be expected or that has fewer than 6 vertices' share of the area.
  * A reference with a border, or one that saw only a part of its frame, is never unsupported, stretched or
  * vacated: what cameras see differs.  Where it is known what of the surface they could see in a frame, the
  * rest of it is neither unsupported nor stretched, and has no share of the points; nor is what no point of the

@@ -9,7 +9,11 @@
 #include "pipeline/frame_box.h"
 
 /* Set by trial.  evaluate_internal.h says how they are used. */
+#define LINKS         6   /* neighbours that are searched for others of a cluster of far points         */
 #define STRETCH_LEAST 1.5 /* times an edge's length in the reference                               */
+#define LEAST_FAR     12  /* points in a place                                                     */
+#define LEAST_MISSED  20  /* points that would lie on a place of the surface                       */
+#define LEAST_VERTS   6   /* vertices whose mean area it has                                       */
 #define MOST_OF       0.6 /* of the points that a part should have; of the reach, which stretched surface is off */
 
 struct npg_misfit_finder {
@@ -82,11 +86,11 @@ static npg_status largest_far(npg_patch *place, npg_arena *scratch, const float 
 {
     npg_neighbours near;
     uint32_t *parents = npg_arena_take(scratch, count, sizeof *parents);
-    NPG_TRY(npg_neighbours_take(&near, scratch, far, count, far, count, NPG_AROUND));
+    NPG_TRY(npg_neighbours_take(&near, scratch, far, count, far, count, LINKS));
     for (size_t i = 0; i < count; i++) parents[i] = (uint32_t)i;
-    for (size_t i = 0; i < NPG_AROUND * count; i++)
+    for (size_t i = 0; i < LINKS * count; i++)
         if ((double)near.dist_sq[i] <= link * link)
-            npg_set_join(parents, (uint32_t)(i / NPG_AROUND), near.index[i]);
+            npg_set_join(parents, (uint32_t)(i / LINKS), near.index[i]);
     return npg_patch_of_sets(place, parents, NULL, far, NULL, count);
 }
 
@@ -112,7 +116,7 @@ static npg_status find_far(npg_misfit_finder *f, npg_misfit *misfit, const npg_m
     }
     npg_status status = count ? largest_far(&place, &scratch, far, count, link) : npg_arena_status(&scratch);
     if (!status && count) /* less a hair: shares are rounded */
-        take_place(misfit, &place, (NPG_PATCH - 1e-6) / (double)count,
+        take_place(misfit, &place, (LEAST_FAR - 1e-6) / (double)count,
                    (double)count / (double)frame->point_count);
     npg_arena_release(&scratch);
     return status;
@@ -137,9 +141,9 @@ static npg_status take_flagged(npg_misfit *misfit, const npg_misfit_finder *f, c
 {
     npg_patch place;
     NPG_TRY(npg_patch_largest(&place, f->flags, frame->vert_unit, frame->vert_areas, f->reference));
-    take_place(misfit, &place,
-               fmax(NPG_PATCH / (double)frame->point_count, NPG_AROUND / (double)f->reference->vert_count),
-               1);
+    take_place(
+        misfit, &place,
+        fmax(LEAST_MISSED / (double)frame->point_count, LEAST_VERTS / (double)f->reference->vert_count), 1);
     return NPG_OK;
 }
 
@@ -191,7 +195,7 @@ static void find_vacated(npg_misfit_finder *f, npg_misfit *misfit, const npg_mis
         if (!(sum[0] > 0)) continue;
         double expected = (double)frame->point_count * sum[0] / whole, missing = expected - sum[4];
         double share = missing / (double)frame->point_count;
-        if (!(sum[4] < MOST_OF * expected) || missing < NPG_PATCH || share <= misfit->share) continue;
+        if (!(sum[4] < MOST_OF * expected) || missing < LEAST_MISSED || share <= misfit->share) continue;
         misfit->share = share;
         for (size_t a = 0; a < 3; a++) misfit->at[a] = sum[1 + a] / sum[0];
     }

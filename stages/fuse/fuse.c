@@ -27,17 +27,21 @@
 #include "reference/reference.h"
 #include "track/track.h"
 
-#define SIDE_LEAST 0.25 /* of a cell, in spacings of the keyframe's points */
+#define SIDE_LEAST   0.25 /* of a cell, in spacings of the keyframe's points */
+#define FRAMES_SHARE 0.05 /* of all frames must have seen a place: wrong motion shows others in a few */
 
 #define COLOURS_MOST 60000 /* cubes; at 20 000 faces each vertex has six                          */
 #define COLOUR_KEY   16    /* what the keyframe's colours count, those of frames far away being 1 */
 
 /* Space that sensors saw empty, in spacings of the keyframe's points, each over eight of them. */
-#define EMPTY_SIDE 0.4    /* of a cell, and of a depth map's at the points' distance             */
-#define EMPTY_MOST 300000 /* cells at most: larger ones then                                    */
+#define EMPTY_SIDE   0.4    /* of a cell                                */
+#define EMPTY_MOST   300000 /* cells at most: larger ones then          */
+#define EMPTY_BIN    0.5    /* of a depth map, at the points' distance  */
+#define EMPTY_MARGIN 0.3    /* that a place must be before what was seen */
 
 /* While a reference that is one side of the body grows. */
-#define GROW_WEIGHT 0.25 /* of such a point, one on the surface being 1                              */
+#define GROW_WEIGHT    0.25 /* of such a point, one on the surface being 1                       */
+#define DENSE_SPACINGS 1.5  /* of the keyframe's points, within which a place must have NPG_PATCH */
 
 enum { FROM_KEY, FROM_ALL };
 
@@ -166,8 +170,8 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
                      .sensor_count = frame->sensor_count,
                      .points = c->points,
                      .point_count = c->count,
-                     .bin = EMPTY_SIDE * s->spacing,
-                     .margin = EMPTY_SIDE * s->spacing + NPG_WITHIN * s->noise};
+                     .bin = EMPTY_BIN * s->spacing,
+                     .margin = EMPTY_MARGIN * s->spacing + NPG_WITHIN * s->noise};
     if (!s->empty)
         NPG_TRY(npg_carving_open(&s->empty, facts->reference, EMPTY_SIDE * s->spacing,
                                  NPG_BEYOND * s->spacing, EMPTY_MOST));
@@ -270,7 +274,7 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
 {
     const state *s = npg_worker_state(worker);
     size_t most = npg_cells_count(s->cells);
-    double least = fmax(NPG_CONFIRMED, NPG_FEW * (double)s->frames);
+    double least = fmax(NPG_CONFIRMED, FRAMES_SHARE * (double)s->frames);
     /* What is new may be seen by the last frame that is reached alone. */
     bool is_one_enough = s->frames < 2 * NPG_CONFIRMED || npg_worker_facts(worker)->brief.is_growing;
     int64_t frames_least = is_one_enough ? 1 : (int64_t)least;
@@ -280,9 +284,9 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
     fused->key_spacing_unit = s->spacing;
     fused->key_noise_unit = s->noise;
     NPG_TRY(npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least));
-    return s->grow_dist > 0
-               ? drop_scattered(fused, fmax(NPG_SAMPLED * s->spacing, NPG_VOTE_CELLS * fused->spacing_unit))
-               : NPG_OK;
+    return s->grow_dist > 0 ? drop_scattered(fused, fmax(DENSE_SPACINGS * s->spacing,
+                                                         NPG_VOTE_CELLS * fused->spacing_unit))
+                            : NPG_OK;
 }
 
 static npg_status collect_colours(const state *s, npg_fused *fused)

@@ -13,6 +13,7 @@
 #define SMOOTH_NEIGHBOURS 24
 #define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define UNSEEN_IS_A_SIDE  0.25 /* of the area: more than holes, a side that no camera saw */
+#define UNSEEN_IS_LEFT    0.05 /* the same of one that has grown: where the body goes on, out of sight */
 
 typedef struct reconstruction { /* what is known while the mesh is made */
     npg_worker *worker;
@@ -119,7 +120,7 @@ static npg_status judge_unseen(reconstruction *r)
     const npg_facts *facts = npg_worker_facts(r->worker);
     const npg_point_set *p = r->set;
     int way = r->settings->unseen;
-    double share, side = facts->brief.growing_passes ? NPG_FEW : UNSEEN_IS_A_SIDE;
+    double share, side = facts->brief.growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
     NPG_TRY(npg_mesh_unseen(&share, r->mesh, p->points, p->count, p->seen_dist));
     r->trims_unseen =
         way == NPG_UNSEEN_TRIM || facts->brief.is_growing || (way != NPG_UNSEEN_KEEP && share > side);

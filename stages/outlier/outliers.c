@@ -6,9 +6,10 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "geometry/limits.h"
 #include "pipeline/memory.h"
 #include "pipeline/parallel.h"
+
+#define ROUNDS 8 /* of the filter, each on what the one before has left; set by trial */
 
 typedef struct filter {
     const float *points;
@@ -106,7 +107,7 @@ npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, i
     memset(keep, 1, count);
     if (count <= f.neighbours) return NPG_OK;
     npg_status status = open_filter(&f);
-    for (int round = 0; round < NPG_ROUNDS_MOST && dropped && f.left > f.neighbours && !status; round++) {
+    for (int round = 0; round < ROUNDS && dropped && f.left > f.neighbours && !status; round++) {
         status = npg_kdtree_each(f.tree, f.neighbours + 1, round ? f.is_asked : NULL, measure, &f, threads);
         if (!status) status = drop(&f, &dropped, threshold_of(&f, ratio));
     }

@@ -7,7 +7,8 @@
 
 #include "geometry/limits.h"
 
-#define HELD_OUT 5 /* one point of so many */
+#define HELD_OUT     5   /* one point of so many */
+#define FLIPPED_MOST 0.1 /* of given normals: beyond, those of other frames are not used */
 
 /* ---- the list ---- */
 
@@ -160,8 +161,7 @@ npg_status npg_candidate_follow(const npg_candidate_clouds *clouds, size_t from,
 {
     npg_arena scratch = {.purpose = NPG_FOR_FIT};
     follower f = {.clouds = clouds, .seen = seen, .user = user};
-    /* unless many of the given ones are on the wrong side */
-    f.with_normals = clouds->given && (double)clouds->flipped <= (1 - NPG_MOST) * (double)clouds->given;
+    f.with_normals = clouds->given && (double)clouds->flipped <= FLIPPED_MOST * (double)clouds->given;
     npg_status status = open_follower(&f, &scratch, mesh, settings);
     for (int step = -1; step <= 1 && !status; step += 2) {
         npg_pose_rest(f.pose, f.node_count);
