@@ -82,25 +82,22 @@ static const npg_option options[] = {
 
 typedef struct cloud {
     npg_arena arena;
-    float *points, *normals; /* unit */
+    float *points; /* unit */
     npg_skinned *warped;
+    const float *normals;   /* of the frame, a loan, or NULL */
+    const uint8_t *colours; /* the same */
     size_t count;
-    const uint8_t *colours; /* of the frame, a loan, or NULL ... */
-    size_t of;              /* ... and how many points it has    */
 } cloud;
 
 static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame *frame)
 {
-    size_t most = frame->point_count;
-    c->points = npg_arena_take(&c->arena, most, 3 * sizeof *c->points);
-    if (frame->normals) c->normals = npg_arena_take(&c->arena, most, 3 * sizeof *c->normals);
-    c->warped = npg_arena_take(&c->arena, most, sizeof *c->warped);
-    NPG_TRY(npg_arena_status(&c->arena));
-    c->count =
-        npg_points_spread(c->points, c->normals, most, frame->pos_local, frame->normals, frame->point_count);
+    c->count = frame->point_count;
+    c->normals = frame->normals;
     c->colours = npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? NULL : frame->colours;
-    c->of = frame->point_count;
-    npg_box_local_to_unit(&npg_worker_facts(worker)->box, c->points, c->points, c->count);
+    c->points = npg_arena_take(&c->arena, c->count, 3 * sizeof *c->points);
+    c->warped = npg_arena_take(&c->arena, c->count, sizeof *c->warped);
+    NPG_TRY(npg_arena_status(&c->arena));
+    npg_box_local_to_unit(&npg_worker_facts(worker)->box, c->points, frame->pos_local, c->count);
     return NPG_OK;
 }
 
@@ -142,7 +139,7 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
             s->strays++;
             continue;
         }
-        const uint8_t *colour = c->colours ? c->colours + 4 * npg_spread_index(i, c->count, c->of) : NULL;
+        const uint8_t *colour = c->colours ? c->colours + 4 * i : NULL;
         if (colour && colour[3] && is_near && s->colours)
             npg_colour_cells_add(s->colours, p->foot, p->facing, colour, weight);
         NPG_TRY(npg_cells_add(s->cells, is_near ? p->foot : p->point, is_near ? p->facing : p->normal,
