@@ -83,8 +83,9 @@ static void list_candidates(choosing *c)
     }
 }
 
-/* The one of the least figure, where that is clearly better than the one by score.  Chance is not asked: a
- * candidate does well near itself and badly far off, so the differences of two scatter whichever is better. */
+/* The one of the least figure, where that is better than the one by score clearly, or beyond chance.  One of them is
+ * enough: a candidate does well near itself and badly far off, so the differences of two scatter whichever is
+ * better. */
 static size_t least_of(const npg_candidate *list, size_t count, size_t scored)
 {
     size_t first = scored < count ? scored : 0, best = first;
@@ -93,7 +94,8 @@ static size_t least_of(const npg_candidate *list, size_t count, size_t scored)
         if (list[i].is_followed &&
             (!list[best].is_followed || list[i].judgement.mean < list[best].judgement.mean))
             best = i;
-    return !list[first].is_followed || npg_judged_clearly(&list[best].judgement, &list[first].judgement)
+    return !list[first].is_followed || npg_judged_clearly(&list[best].judgement, &list[first].judgement) ||
+                   npg_judged_worse(&list[first].judgement, &list[best].judgement)
                ? best
                : first;
 }
