@@ -24,6 +24,12 @@
 #define AGAIN    2   /* times the final stiffness and width, where a fit starts near its end */
 #define GRAIN    512 /* targets, samples or edges at a time: a thread's next piece of work */
 
+/* Of a sample that was in empty space. */
+typedef struct way_out {
+    float place[3], direction[3]; /* the nearest place that is not empty, and the way there */
+    bool is_taken;                /* in a step of the fit at work */
+} way_out;
+
 struct npg_tracker {
     npg_arena arena; /* of all arrays that are not said to be loans */
     npg_tracker_settings settings;
@@ -52,6 +58,7 @@ struct npg_tracker {
     float *near_sq, *sample_pos;
     uint8_t *is_seen;  /* samples: by a sensor, in the pose at work */
     uint8_t *is_empty; /* samples: where a sensor saw that nothing is */
+    way_out *outs;     /* samples */
     npg_visible visible;
     npg_occlusion_prior prior; /* edges of what no sensor sees */
     npg_block_term *terms;     /* of the targets, the samples, and the edges, both ways, of a step */
@@ -137,6 +144,7 @@ static npg_status open_arrays(npg_tracker *t)
     t->sample_pos = npg_arena_take(arena, s, 3 * sizeof(float));
     t->is_seen = npg_arena_take(arena, s, 1);
     t->is_empty = npg_arena_take(arena, s, 1);
+    t->outs = npg_arena_take(arena, s, sizeof *t->outs);
     npg_visible_open(&t->visible, arena, s);
     return npg_arena_status(arena);
 }
@@ -321,21 +329,38 @@ static void set_targets(const step *s, size_t first, size_t last)
 }
 
 /* Surface where nothing is goes the shortest way out of there, seen or not, however far that is: the nearest point
- * may be of what stands far behind it. */
-static void set_stray(npg_block_term *term, const step *s, pull *p, const float *place, double weight)
+ * may be of what stands far behind it.  There it is held to the end of the fit: free again it would go back to where
+ * it came from, and every other step would end in empty space. */
+static void set_stray(npg_block_term *term, const step *s, size_t i, pull *p, double weight)
 {
+    npg_tracker *t = s->t;
+    way_out *out = &t->outs[i];
+    const float *place = t->sample_pos + 3 * i;
     double way[3];
-    float to[3];
-    if (!npg_free_space_leave(s->cloud->space, to, place)) return;
-    for (size_t c = 0; c < 3; c++) {
-        p->target[c] = (double)to[c];
-        p->normal[c] = way[c] = p->target[c] - (double)place[c];
+    if (t->is_empty[i]) {
+        if (!npg_free_space_leave(s->cloud->space, out->place, place)) return;
+        npg_vec3_between(way, place, out->place);
+        if (!npg_vec3_make_unit(way)) return;
+        for (int c = 0; c < 3; c++) out->direction[c] = (float)way[c];
+        out->is_taken = true;
     }
-    if (!npg_vec3_make_unit(p->normal)) return;
-    set_pull(term, s->t, p, s->pose, weight, fmax(s->width, npg_vec3_length(way)));
+    for (int c = 0; c < 3; c++) {
+        p->target[c] = (double)out->place[c];
+        p->normal[c] = (double)out->direction[c];
+    }
+    npg_vec3_between(way, place, out->place);
+    set_pull(term, t, p, s->pose, weight, fmax(s->width, npg_vec3_length(way)));
 }
 
-/* Surface -> points, for sample i, if its nearest point is close enough to be its. */
+/* Whether the nearest point of sample i, which faces so, is close enough to be its. */
+static bool has_point(const step *s, size_t i, double facing)
+{
+    const npg_tracker *t = s->t;
+    return t->is_seen[i] && !t->is_empty[i] && !(facing < NPG_AGAINST) &&
+           (double)t->near_sq[i] <= NPG_BEYOND * NPG_BEYOND * s->width * s->width;
+}
+
+/* Surface -> points, for sample i. */
 static void set_sample(npg_block_term *term, const step *s, size_t i)
 {
     const npg_tracker *t = s->t;
@@ -343,21 +368,18 @@ static void set_sample(npg_block_term *term, const step *s, size_t i)
     size_t v = t->samples[i], near = t->near[i];
     pull p;
     term->count = 0;
-    if (!t->is_seen[i] && !t->is_empty[i]) return;
     for (size_t c = 0; c < 3; c++) {
         p.rest[c] = t->mesh->vert_pos[3 * v + c];
         p.normal[c] = (double)t->vert_normals[3 * v + c];
         p.target[c] = (double)s->cloud->points[3 * near + c];
         if (s->normals) facing += p.normal[c] * (double)s->normals[3 * near + c];
     }
-    bool is_far = (double)t->near_sq[i] > NPG_BEYOND * NPG_BEYOND * s->width * s->width;
-    if (!t->is_empty[i] && (facing < NPG_AGAINST || is_far)) return;
     memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
     memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
-    if (t->is_empty[i])
-        set_stray(term, s, &p, t->sample_pos + 3 * i, weight);
-    else
+    if (has_point(s, i, facing))
         set_pull(term, t, &p, s->pose, weight, s->width);
+    else if (t->is_empty[i] || t->outs[i].is_taken)
+        set_stray(term, s, i, &p, weight);
 }
 
 /* Edge e / 2 keeps its length and direction in the frame of one end, as at rest or as it is held. */
@@ -577,6 +599,7 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     NPG_TRY(npg_kdtree_open(&tree, cloud->points, cloud->count));
     *tracked = (npg_tracked){0};
     npg_status status = NPG_OK;
+    for (size_t i = 0; i < t->sample_count; i++) t->outs[i].is_taken = false;
     step s = {.t = t, .pose = pose, .tree = tree, .cloud = cloud};
     if (!effort) effort = &usual;
     const npg_prior_poses start = {.pose = pose};

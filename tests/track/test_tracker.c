@@ -126,6 +126,24 @@ static void a_piece_without_points_goes_along(void **state)
     npg_mesh_unref(&both);
 }
 
+enum { SIDE = 60 }; /* cells of an image */
+
+/* What a sensor at (0, 0, -4) says, which looks along z. */
+static npg_free_space *space_of(float cells[SIDE * SIDE])
+{
+    static const npg_frame_box unit = {.scale = 1};
+    npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4},
+                           .first = {-0.3, -0.3},
+                           .step = 0.01,
+                           .width = SIDE,
+                           .height = SIDE};
+    const npg_frame frame = {
+        .sensor_count = 1, .views = &view, .view_cells = cells, .view_cell_count = SIDE * SIDE};
+    npg_free_space *space;
+    assert_int_equal(npg_free_space_open(&space, &frame, &unit), NPG_OK);
+    return space;
+}
+
 /* How far the second ball moves towards the first, of which alone there are points, in three fits. */
 static double moved_inward(const npg_free_space *space)
 {
@@ -158,27 +176,65 @@ static double moved_inward(const npg_free_space *space)
 
 static void surface_where_nothing_is_is_pulled_out(void **state)
 {
-    enum { SIDE = 60 };
     static float cells[SIDE * SIDE];
-    static const npg_frame_box unit = {.scale = 1};
-    npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4},
-                           .first = {-0.3, -0.3},
-                           .step = 0.01,
-                           .width = SIDE,
-                           .height = SIDE};
-    const npg_frame frame = {
-        .sensor_count = 1, .views = &view, .view_cells = cells, .view_cell_count = SIDE * SIDE};
-    npg_free_space *space;
     (void)state;
     for (int i = 0; i < SIDE * SIDE; i++) { /* the first ball as a disc, around it nothing */
         double x = (i % SIDE + 0.5) / 100 - 0.3, y = (i / SIDE + 0.5) / 100 - 0.3;
         cells[i] = hypot(x, y) < 0.125 ? 3.5F : INFINITY;
     }
-    assert_int_equal(npg_free_space_open(&space, &frame, &unit), NPG_OK);
+    npg_free_space *space = space_of(cells);
     double without = moved_inward(NULL), with = moved_inward(space);
     print_message("the second ball moved by %.4f, where nothing says that it can't be there by %.4f\n", with,
                   without);
     assert_true(fabs(without) < 0.02 && with > 0.05);
+    npg_free_space_close(&space);
+}
+
+/* Share of the vertices of a rod that stand in empty space after so many steps; its left end has points. */
+static double left_in_empty_space(const npg_free_space *space, int steps)
+{
+    const npg_tracker_settings settings = {100, 1500, steps, 0.006, 0.02};
+    static const float sensor[3] = {0, 0, -4};
+    npg_mesh *ball = ball_mesh(30, 40);
+    size_t v = ball->vert_count, count = 0, empty = 0;
+    npg_tracker *tracker;
+    npg_tracked tracked;
+    float *points, *found;
+    double *pose;
+    for (size_t i = 0; i < 3 * v; i++) ball->vert_pos[i] *= i % 3 ? 0.15F : 1;
+    npg_mesh_vertex_normals(ball->vert_normals, ball->vert_pos, v, ball->faces, ball->face_count);
+    assert_int_equal(npg_tracker_open(&tracker, ball, &settings), NPG_OK);
+    size_t nodes = npg_tracker_node_count(tracker);
+    assert_int_equal(npg_alloc_array(&points, NPG_FOR_RUN, v, 3 * sizeof(float)), NPG_OK);
+    assert_int_equal(npg_alloc_array(&found, NPG_FOR_RUN, v, 3 * sizeof(float)), NPG_OK);
+    assert_int_equal(npg_alloc_array(&pose, NPG_FOR_RUN, nodes, NPG_POSE_SIZE * sizeof(double)), NPG_OK);
+    npg_pose_rest(pose, nodes);
+    for (size_t i = 0; i < v; i++)
+        if (ball->vert_pos[3 * i] < -0.1F)
+            memcpy(points + 3 * count++, ball->vert_pos + 3 * i, 3 * sizeof(float));
+    const npg_tracker_cloud cloud = {
+        .points = points, .count = count, .sensors = sensor, .sensor_count = 1, .space = space};
+    assert_int_equal(npg_tracker_fit(tracker, &tracked, pose, &cloud, NULL, NULL), NPG_OK);
+    npg_tracker_vertices(tracker, found, pose);
+    for (size_t i = 0; i < v; i++) empty += npg_free_space_is_empty(space, found + 3 * i);
+    npg_release(&points);
+    npg_release(&found);
+    npg_release(&pose);
+    npg_tracker_close(&tracker);
+    npg_mesh_unref(&ball);
+    return (double)empty / (double)v;
+}
+
+static void what_has_left_empty_space_stays_out(void **state)
+{
+    static float cells[SIDE * SIDE];
+    (void)state;
+    for (int i = 0; i < SIDE * SIDE; i++) /* nothing above and where the right half is, something below it */
+        cells[i] = i % SIDE < SIDE / 2 || i / SIDE < SIDE / 2 - 3 ? 4 : INFINITY;
+    npg_free_space *space = space_of(cells);
+    double even = left_in_empty_space(space, 14), odd = left_in_empty_space(space, 15);
+    print_message("in empty space after 14 steps %.3f, after 15 %.3f\n", even, odd);
+    assert_true(even < 0.05 && odd < 0.05);
     npg_free_space_close(&space);
 }
 
@@ -187,6 +243,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_piece_without_points_goes_along),
         cmocka_unit_test(surface_where_nothing_is_is_pulled_out),
+        cmocka_unit_test(what_has_left_empty_space_stays_out),
         cmocka_unit_test(thin_meshes_are_made_of_the_whole_one_s_vertices),
         cmocka_unit_test(a_fine_reference_is_aligned_whole),
     };
