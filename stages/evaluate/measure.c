@@ -334,17 +334,21 @@ static double lost_share(const npg_measure *m, const npg_free_space *space, size
     return known ? (double)lost / (double)known : 0;
 }
 
-/* What depth images say: of the area, where they show that nothing is, and of the points. */
+/* What depth images say: of the area, before what they show or outside of its outline, whichever is more, and of
+ * the points. */
 static npg_status measure_by_images(const npg_measure *m, npg_frame *frame, const npg_frame_box *box,
                                     size_t point_count, double whole)
 {
     npg_free_space *space;
-    double sum = 0;
+    double before = 0, beside = 0;
     NPG_TRY(npg_free_space_open(&space, frame, box));
     if (!space) return NPG_OK;
-    for (size_t i = 0; i < m->proxy->mesh->vert_count; i++)
-        if (npg_free_space_is_empty(space, m->vert_unit + 3 * i)) sum += m->vert_areas[i];
-    frame->figures.nowhere_share = whole > 0 ? sum / whole : 0;
+    for (size_t i = 0; i < m->proxy->mesh->vert_count; i++) {
+        npg_sight_kind kind = npg_free_space_look(space, m->vert_unit + 3 * i);
+        before += kind == NPG_SEEN_EMPTY ? m->vert_areas[i] : 0;
+        beside += kind == NPG_SEEN_BESIDE ? m->vert_areas[i] : 0;
+    }
+    frame->figures.nowhere_share = whole > 0 ? fmax(before, beside) / whole : 0;
     frame->figures.lost_share = lost_share(m, space, point_count);
     npg_free_space_close(&space);
     return NPG_OK;
