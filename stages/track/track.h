@@ -187,9 +187,9 @@ void npg_prior_count(const npg_occlusion_prior *prior, float *since, const float
  * noisier they are the more of them must agree before the surface gives way.  L: longest side of the reference
  * against that of the box of all frames.  One sensor leaves half of the body to the edges.  Samples without a
  * point within 3 w have no part; those where a sensor saw that nothing is go the shortest way out of there
- * (npg_free_space_leave()), where they are held until they have a point, and w is at least as long as that is.  Few unknowns, second order: it reaches what
- * gradient descent needs hundreds of steps for; the joint fit then needs to find only what the graph can't
- * express.
+ * (npg_free_space_leave()), where they are held until they have a point, and w is at least as long as that is.
+ * Few unknowns, second order: it reaches what gradient descent needs hundreds of steps for; the joint fit then
+ * needs to find only what the graph can't express.
  *
  * Not in the paper: it replaces the slow way from the identity (paper, "Deformation Loss", confidence). */
 
