@@ -393,7 +393,7 @@ static const npg_option options[] = {
         "cent"),
     NPG_PART(REAL,          "bars.nowhere",     AT(nowhere_max),        "1",      0, 100,  "PERCENT",
         "most of its surface in space that a depth image shows to be empty: clearly before what was measured, "
-        "or outside the outline of a body whose background was removed, in per cent"),
+        "or outside the outline of a body whose background was removed, each by itself, in per cent"),
     NPG_PART(REAL,          "bars.lost",        AT(lost_max),           "2",      0, 100,  "PERCENT",
         "most of its points that lie farther from the surface than depth images are sure of, three cells of "
         "160 along an image, in per cent"),

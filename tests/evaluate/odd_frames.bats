@@ -9,7 +9,7 @@ setup_file() {
 
 setup() {
     cd "$BATS_FILE_TMPDIR"
-    small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
+    small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 100, "align-steps": 10}' --faces 800
         --keyframe 3)
 }
 
@@ -92,7 +92,7 @@ bad_frames() {
     mkdir two
     cp bar/points/* two/
     for n in 06 07 08 09 10 11; do awk '$1 == "v" { $3 -= 0.9 } { print }' "walker/points/frame_00$n.obj" >"two/frame_00$n.obj"; done
-    method='{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10, "attempts": 2}'
+    method='{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 100, "align-steps": 10, "attempts": 2}'
     run_it 7 two --method "$method" --faces 800 --verbose
     tr -d ' \n' <two-out/report.json >report
     grep -q '"attempts":\[{"keyframe":[0-9]*,"frames_bad":[0-9]*,"kept":[a-z]*},{"keyframe":' report
