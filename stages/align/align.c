@@ -319,8 +319,8 @@ static npg_status sweep_group(npg_worker *worker, npg_recover_frame *frames, siz
     return NPG_OK;
 }
 
-/* Where frames see a side of the body each, none is tried again: distances differ by what is seen, and the
- * frames that look most alike are those of a body's front and back. */
+/* Where frames see a side of the body each, and no image tells what is lost, none is tried again: distances differ by
+ * what is seen, and the frames that look most alike are those of a body's front and back. */
 static npg_status finish_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -330,7 +330,7 @@ static npg_status finish_group(npg_worker *worker)
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group.count + NPG_GROUP_FIXED, sizeof *frames));
     size_t count = npg_group_list(&s->group, frames);
     npg_status status = sweep_group(worker, frames, count);
-    if (!status && !is_of_one_side) status = recover_group(worker, frames, count);
+    if (!status && (!is_of_one_side || facts->view_count_max)) status = recover_group(worker, frames, count);
     if (!status) npg_group_take(&s->group, frames, count);
     npg_release(&frames);
     return status;

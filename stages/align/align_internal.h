@@ -21,8 +21,9 @@
  *     3  the motion of the two frames before it, and of the two after it, taken on
  *     4  the poses of the frame before it and of the one after it
  *
- * and the pose that explains its points best stays.  What is found helps the frames around it, so this is
- * repeated until none is found.  A frame is lost when its Chamfer distance is well above that of the
+ * and the pose of the least cost (track.h) stays.  What is found helps the frames around it, so this is
+ * repeated until none is found.  Before depth images a frame is lost when more of its points, or of the surface, is
+ * astray than a few per cent; else when its Chamfer distance is well above that of the
  * window's best quarter, and so are its points' distances alone: a frame with fewer points or with holes has
  * surface far from them, too, and what it is then found by is a worse pose.  Not in the paper. */
 

@@ -12,7 +12,7 @@
 #define LOST        1.4  /* times what the best quarter has: its Chamfer distance, and ...            */
 #define POINTS_LOST 1.1  /* ... its points' distances alone, which holes do not raise                 */
 #define LEVEL_LEAST 1e-6 /* square units: what is below does not matter                                 */
-#define BETTER      0.95 /* times a frame's Chamfer distance: what a new pose must reach                */
+#define BETTER      0.95 /* times the cost of a frame's pose: what a new one must reach                 */
 #define SWEEPS      5    /* at most                                                                     */
 #define ALIKE       3    /* frames whose points look alike that are started from                        */
 #define VAIN_MOST   4    /* lost frames in a row that no start finds: the reference does not fit        */
@@ -44,7 +44,7 @@ typedef struct start {
 } start;
 
 /* Fit the frame from there, hidden parts held by `poses`.  *taken: whether its pose and what was tracked
- * become the new ones, those of a Chamfer distance of at most `share` times the old one. */
+ * become the new ones, those of a cost of at most `share` times the old one. */
 static npg_status attempt(const attempts *a, bool *taken, npg_recover_frame *frame, const start *from,
                           const npg_prior_poses *poses, double share)
 {
@@ -57,7 +57,7 @@ static npg_status attempt(const attempts *a, bool *taken, npg_recover_frame *fra
     else
         memcpy(a->trial, from->now, bytes);
     NPG_TRY(npg_tracker_fit(a->tracker, &tracked, a->trial, &frame->cloud, poses, from->effort));
-    if (tracked.chamfer > share * frame->tracked.chamfer) return NPG_OK;
+    if (tracked.cost > share * frame->tracked.cost) return NPG_OK;
     *taken = true;
     frame->tracked = tracked;
     memcpy(frame->pose, a->trial, bytes);
@@ -84,16 +84,20 @@ static bool is_known(const npg_recover_frame *frame)
     return frame->cloud.count > 0;
 }
 
+/* Depth images tell by themselves: a part of the body is lost, or stands where nothing is. */
 static bool is_off(const recovery *r, const npg_recover_frame *frame)
 {
-    return is_known(frame) && frame->tracked.chamfer > LOST * r->level;
+    const npg_tracked *tracked = &frame->tracked;
+    return is_known(frame) &&
+           (tracked->by_images ? tracked->astray > NPG_FEW : tracked->chamfer > LOST * r->level);
 }
 
 /* Off because its surface has no points near it is not lost: a frame with fewer points, or with holes, has
  * that, too. */
 static bool is_lost(const recovery *r, const npg_recover_frame *frame)
 {
-    return is_off(r, frame) && frame->tracked.point_dist_sq > POINTS_LOST * r->point_level;
+    return is_off(r, frame) &&
+           (frame->tracked.by_images || frame->tracked.point_dist_sq > POINTS_LOST * r->point_level);
 }
 
 /* offset: of a figure in npg_tracked. */
@@ -139,7 +143,7 @@ static npg_status find_alike(alike found[ALIKE], size_t *found_count, const reco
     for (size_t k = 0; k < r->count; k++) {
         const npg_recover_frame *frame = &r->frames[k];
         alike next;
-        if (k == i || !is_known(frame) || frame->tracked.chamfer >= r->frames[i].tracked.chamfer) continue;
+        if (k == i || !is_known(frame) || frame->tracked.cost >= r->frames[i].tracked.cost) continue;
         NPG_TRY(compare(&next, r, k, i));
         size_t at = *found_count;
         for (; at > 0 && next.unlike < found[at - 1].unlike; at--)
@@ -222,7 +226,7 @@ static npg_status recover_frame(recovery *r, size_t i, int sweep)
 static double best_beside(const recovery *r, size_t i)
 {
     const npg_recover_frame *before = frame_at(r, i, -1), *after = frame_at(r, i, 1);
-    return fmin(before ? before->tracked.chamfer : HUGE_VAL, after ? after->tracked.chamfer : HUGE_VAL);
+    return fmin(before ? before->tracked.cost : HUGE_VAL, after ? after->tracked.cost : HUGE_VAL);
 }
 
 /* The lost frames, those beside the best ones first. */

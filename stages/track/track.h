@@ -188,6 +188,11 @@ void npg_prior_count(const npg_occlusion_prior *prior, float *since, const float
  * against that of the box of all frames.  One sensor leaves half of the body to the edges.  Samples without a
  * point within 3 w have no part; those where a sensor saw that nothing is go the shortest way out of there
  * (npg_free_space_leave()), where they are held until they have a point, and w is at least as long as that is.
+ * What a fit comes to is its Chamfer distance of what can be compared; before depth images, which tell what is lost,
+ *
+ *     cost = mean_p min(d_p^2, tau^2) / tau^2 + mean_s min(d_s^2, tau^2) / tau^2
+ *
+ * over all points p and the samples s that are seen, or stand in empty space, which counts 1; tau = 3 w at the end.
  * Few unknowns, second order: it reaches what gradient descent needs hundreds of steps for; the joint fit then
  * needs to find only what the graph can't express.
  *
@@ -209,7 +214,11 @@ typedef struct npg_tracked {
     double point_dist_sq;   /* the same, mean of squares                                          */
     double chamfer;         /* mean of squared distances, points -> surface and surface -> points */
     double explained;       /* share of the target points that it has a place for                 */
-    double change;          /* the last step's largest movement of a node                         */
+    double
+        astray;  /* by depth images: share of the points that are lost, and of the surface where nothing is */
+    double cost; /* what poses of a frame are compared by                              */
+    bool by_images; /* `cost` is theirs, else the Chamfer distance; `astray` is known     */
+    double change;  /* the last step's largest movement of a node                         */
     int steps;
 } npg_tracked;
 

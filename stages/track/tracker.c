@@ -63,9 +63,10 @@ struct npg_tracker {
     npg_occlusion_prior prior; /* edges of what no sensor sees */
     npg_block_term *terms;     /* of the targets, the samples, and the edges, both ways, of a step */
     struct sums {
-        double dist, dist_sq;
-        size_t compared, explained; /* that can be of the surface at all; that it has a place for */
-    } * sums;                       /* of each grain of targets */
+        double dist, dist_sq, bounded; /* bounded: of the cost                                      */
+        size_t compared, explained;    /* that can be of the surface at all; that it has a place for */
+        size_t known, lost;            /* by depth images                                            */
+    } * sums;                          /* of each grain of targets */
 };
 
 size_t npg_tracker_node_count(const npg_tracker *tracker)
@@ -300,6 +301,13 @@ typedef struct step {
     bool is_first, is_settling;
 } step;
 
+/* Of a distance: its share in the cost. */
+static double bounded(const npg_tracker *t, double dist_sq)
+{
+    double tau = NPG_BEYOND * WIDTH_END * t->size;
+    return fmin(1, dist_sq / (tau * tau));
+}
+
 /* Points -> surface, targets [first, last), all of one grain. */
 static void set_targets(const step *s, size_t first, size_t last)
 {
@@ -311,6 +319,10 @@ static void set_targets(const step *s, size_t first, size_t last)
         pull p;
         term->count = 0;
         hit_normal(p.normal, t, hit);
+        double margin = s->cloud->space ? npg_free_space_margin(s->cloud->space, t->targets + 3 * i) : 0;
+        sums.known += margin > 0;
+        sums.lost += margin > 0 && (double)hit->dist_sq > margin * margin;
+        sums.bounded += bounded(t, (double)hit->dist_sq);
         if (s->cloud->sensor_count && !could_be_seen(t, s->cloud, hit, t->targets + 3 * i, p.normal))
             continue;
         sums.compared++;
@@ -506,16 +518,22 @@ static npg_status set_terms(void *user, size_t part)
     return NPG_OK;
 }
 
-/* Surface -> points: its part of the Chamfer distance, of what could be seen. */
-static double samples_chamfer(const npg_tracker *t)
+/* Surface -> points: its part of the Chamfer distance, of what could be seen, and of the cost. */
+static void sum_up_samples(npg_tracked *tracked, const npg_tracker *t)
 {
-    double sum = 0;
-    size_t count = 0;
+    double sum = 0, cost = 0;
+    size_t seen = 0, empty = 0, both = 0;
     for (size_t i = 0; i < t->sample_count; i++) {
-        sum += t->is_seen[i] ? (double)t->near_sq[i] : 0;
-        count += t->is_seen[i];
+        double dist_sq = t->is_seen[i] ? (double)t->near_sq[i] : 0;
+        sum += dist_sq;
+        seen += t->is_seen[i];
+        empty += t->is_empty[i];
+        both += t->is_seen[i] || t->is_empty[i];
+        cost += t->is_empty[i] ? 1 : bounded(t, dist_sq);
     }
-    return count ? sum / (double)count : 0;
+    tracked->chamfer += seen ? sum / (double)seen : 0;
+    tracked->cost += both ? cost / (double)both : 0;
+    tracked->astray += (double)empty / (double)t->sample_count;
 }
 
 static npg_status gather(step *s)
@@ -540,7 +558,7 @@ static npg_status gather(step *s)
 }
 
 /* What the grains of targets come to, scaled as if all had been compared. */
-static void sum_up(npg_tracked *tracked, const npg_tracker *t)
+static void sum_up(npg_tracked *tracked, const npg_tracker *t, bool by_images)
 {
     struct sums all = {0};
     for (size_t g = 0; g < grains_of(t->target_count); g++) {
@@ -548,12 +566,20 @@ static void sum_up(npg_tracked *tracked, const npg_tracker *t)
         all.dist_sq += t->sums[g].dist_sq;
         all.compared += t->sums[g].compared;
         all.explained += t->sums[g].explained;
+        all.bounded += t->sums[g].bounded;
+        all.known += t->sums[g].known;
+        all.lost += t->sums[g].lost;
     }
     double share = 1 / (double)(all.compared ? all.compared : t->target_count);
     tracked->point_dist_mean = share * all.dist;
     tracked->point_dist_sq = share * all.dist_sq;
     tracked->explained = (double)all.explained / (double)t->target_count;
-    tracked->chamfer = tracked->point_dist_sq + samples_chamfer(t);
+    tracked->chamfer = tracked->point_dist_sq;
+    tracked->cost = all.bounded / (double)t->target_count;
+    tracked->astray = all.known ? (double)all.lost / (double)all.known : 0;
+    sum_up_samples(tracked, t);
+    tracked->by_images = by_images;
+    if (!by_images) tracked->cost = tracked->chamfer;
 }
 
 /* How far a fit has come, 0..1 before the last steps. */
@@ -574,7 +600,7 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
 {
     npg_tracker *t = s->t;
     NPG_TRY(gather(s));
-    sum_up(tracked, t);
+    sum_up(tracked, t, s->cloud->space != NULL);
     npg_block_solve(t->system, t->step, 1e-9, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");

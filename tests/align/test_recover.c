@@ -115,6 +115,26 @@ static void surface_without_points_is_not_lost(void **state)
     close_capture(&c);
 }
 
+/* A limb that stands where nothing is may be small against the whole body. */
+static void what_images_call_astray_is_lost(void **state)
+{
+    static capture c;
+    npg_recover_result result;
+    (void)state;
+    open_capture(&c);
+    double before = c.frames[2].tracked.chamfer;
+    lose(&c, 2);
+    for (int t = 0; t < FRAMES; t++) c.frames[t].tracked.chamfer = 1e-4;
+    assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
+    assert_int_equal(result.lost, 0);
+    c.frames[2].tracked.by_images = true;
+    c.frames[2].tracked.astray = 0.03;
+    assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
+    print_message("%d lost, %d found in %d fits\n", (int)result.lost, (int)result.found, (int)result.tried);
+    assert_true(result.lost == 1 && result.found == 1 && c.frames[2].tracked.cost < 2 * before);
+    close_capture(&c);
+}
+
 static void attempts_end(void **state)
 {
     static capture c;
@@ -125,7 +145,7 @@ static void attempts_end(void **state)
          t++) { /* what no pose of a ball explains, and what one frame claims to explain */
         for (int i = 0; i < 3 * VERTS; i++)
             c.points[t][i] = (float)((i * 7919 + t * 104729) % 2003) / 1001.5f - 1;
-        c.frames[t].tracked.chamfer = t > 4 ? 1e-5 : 1e-3;
+        c.frames[t].tracked.cost = c.frames[t].tracked.chamfer = t > 4 ? 1e-5 : 1e-3;
         c.frames[t].tracked.point_dist_sq = c.frames[t].tracked.chamfer / 2;
     }
     assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
@@ -143,6 +163,7 @@ int main(void)
                                        cmocka_unit_test(lost_frames_are_found_from_the_group_before),
                                        cmocka_unit_test(what_is_found_is_left_alone),
                                        cmocka_unit_test(surface_without_points_is_not_lost),
+                                       cmocka_unit_test(what_images_call_astray_is_lost),
                                        cmocka_unit_test(attempts_end)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -55,7 +55,7 @@ static inline void lose(capture *c, int t)
 {
     npg_recover_frame *frame = &c->frames[t];
     for (size_t k = 0; k < c->size; k += NPG_POSE_SIZE) frame->pose[k + 9] += 0.7;
-    frame->tracked.chamfer = 0.5;
+    frame->tracked.cost = frame->tracked.chamfer = 0.5;
     frame->tracked.point_dist_sq = 0.25;
 }
 
