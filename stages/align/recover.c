@@ -136,6 +136,13 @@ static npg_status compare(alike *found, const recovery *r, size_t k, size_t i)
     return npg_rigid_icp(&found->motion, &found->unlike, &r->looks[k], &r->looks[i], &guess);
 }
 
+/* Whether frame i may be started from its pose. */
+static bool is_better(const recovery *r, const npg_recover_frame *frame, size_t i)
+{
+    const npg_tracked *of = &frame->tracked;
+    return is_known(frame) && (of->by_images ? !is_off(r, frame) : of->cost < r->frames[i].tracked.cost);
+}
+
 /* The frames most like frame i that its tracker explains better, the most alike first. */
 static npg_status find_alike(alike found[ALIKE], size_t *found_count, const recovery *r, size_t i)
 {
@@ -143,7 +150,7 @@ static npg_status find_alike(alike found[ALIKE], size_t *found_count, const reco
     for (size_t k = 0; k < r->count; k++) {
         const npg_recover_frame *frame = &r->frames[k];
         alike next;
-        if (k == i || !is_known(frame) || frame->tracked.cost >= r->frames[i].tracked.cost) continue;
+        if (k == i || !is_better(r, frame, i)) continue;
         NPG_TRY(compare(&next, r, k, i));
         size_t at = *found_count;
         for (; at > 0 && next.unlike < found[at - 1].unlike; at--)

@@ -214,11 +214,10 @@ typedef struct npg_tracked {
     double point_dist_sq;   /* the same, mean of squares                                          */
     double chamfer;         /* mean of squared distances, points -> surface and surface -> points */
     double explained;       /* share of the target points that it has a place for                 */
-    double
-        astray;  /* by depth images: share of the points that are lost, and of the surface where nothing is */
-    double cost; /* what poses of a frame are compared by                              */
-    bool by_images; /* `cost` is theirs, else the Chamfer distance; `astray` is known     */
-    double change;  /* the last step's largest movement of a node                         */
+    double astray;          /* by depth images: lost points + 2 x samples where nothing is, shares  */
+    double cost;            /* what poses of a frame are compared by                              */
+    bool by_images;         /* `cost` is theirs, else the Chamfer distance; `astray` is known     */
+    double change;          /* the last step's largest movement of a node                         */
     int steps;
 } npg_tracked;
 

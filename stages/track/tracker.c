@@ -533,7 +533,8 @@ static void sum_up_samples(npg_tracked *tracked, const npg_tracker *t)
     }
     tracked->chamfer += seen ? sum / (double)seen : 0;
     tracked->cost += both ? cost / (double)both : 0;
-    tracked->astray += (double)empty / (double)t->sample_count;
+    /* twice: half of the samples may be hidden, where nothing tells of them */
+    tracked->astray += 2 * (double)empty / (double)t->sample_count;
 }
 
 static npg_status gather(step *s)
