@@ -70,9 +70,8 @@ typedef struct npg_figures {
     /* Share of the area that no points are near, of this frame or of those that the reference was made from
      * (NaN without npg_mesh.vert_unseen); the middle of its largest part, world (NaN where there is none) */
     double unsupported_share, unsupported_at[3];
-    double
-        nowhere_share; /* of the area, before what depth images show or outside of its outline, whichever is
-                             more; NaN without any */
+    /* Of the area, before what depth images show or outside of its outline, whichever is more; NaN without any. */
+    double nowhere_share;
     double lost_share; /* of the points, farther from the surface than these images are sure of; as above */
     npg_misfit misfits[NPG_MISFITS];
     float marks[3 * NPG_MARKS]; /* vertices far from each other, the same in all frames; unit coordinates
