@@ -12,6 +12,10 @@
 static const npg_tracker_settings judge_tracking = {
     .nodes = 150, .samples = 800, .steps = 8, .stiffness = 0.01, .along = 0.1};
 
+/* Before one depth camera, whose images show what is forgiven: a side of the body has to be found again, not its detail. */
+static const npg_tracker_settings side_tracking = {
+    .nodes = 400, .samples = 2000, .steps = 12, .stiffness = 0.006, .along = 0.001};
+
 struct npg_judging {
     npg_arena arena;
     npg_judge_settings settings;
@@ -34,17 +38,38 @@ static double rho(const npg_judging *j, double dist_sq)
     return fmin(dist_sq, j->tau_sq) / j->tau_sq;
 }
 
+/* One camera sees a side that seldom is the whole body's: what points say of its detail is more than what they say of a
+ * limb that it lacks.  So there counts what its images call wrong, as the verdict has it. */
+static bool is_by_images(const npg_candidate_cloud *cloud)
+{
+    return cloud->space && cloud->sensor_count == 1;
+}
+
 /* ---- both directions ---- */
+
+/* Of a held-out point so far off; *weight 0: images do not tell. */
+static double point_off(double *weight, const npg_judging *j, const npg_candidate_cloud *cloud,
+                        const float point[3], double dist_sq)
+{
+    *weight = 1;
+    if (!is_by_images(cloud)) return rho(j, dist_sq);
+    double margin = npg_free_space_margin(cloud->space, point);
+    *weight = margin > 0;
+    return margin > 0 && dist_sq > margin * margin;
+}
 
 static npg_status points_off(double *mean, const npg_judging *j, const npg_candidate_cloud *cloud)
 {
     npg_arena scratch = {.purpose = NPG_FOR_FIT};
     npg_surface_hit *hits = npg_arena_take(&scratch, cloud->held_count, sizeof *hits);
     npg_status status = npg_arena_status(&scratch);
-    double sum = 0;
+    double sum = 0, asked = 0, weight;
     if (!status) status = npg_surface_closest_near(j->surface, hits, cloud->held, cloud->held_count, NULL, 1);
-    for (size_t i = 0; i < cloud->held_count && !status; i++) sum += rho(j, (double)hits[i].dist_sq);
-    *mean = cloud->held_count ? sum / (double)cloud->held_count : 0;
+    for (size_t i = 0; i < cloud->held_count && !status; i++) {
+        sum += point_off(&weight, j, cloud, cloud->held + 3 * i, (double)hits[i].dist_sq);
+        asked += weight;
+    }
+    *mean = asked > 0 ? sum / asked : 0;
     npg_arena_release(&scratch);
     return status;
 }
@@ -142,19 +167,45 @@ static npg_status surface_off(double *mean, double *seen, npg_judging *j, const 
     return NPG_OK;
 }
 
+/* Share of the surface where images show that nothing is. */
+static double nowhere(const npg_judging *j, const npg_candidate_cloud *cloud, const float *vert_unit)
+{
+    double empty = 0, area = 0;
+    spread_areas(j, vert_unit);
+    for (size_t v = 0; v < j->mesh->vert_count; v++) {
+        area += j->areas[v];
+        if (npg_free_space_is_empty(cloud->space, vert_unit + 3 * v)) empty += j->areas[v];
+    }
+    return area > 0 ? empty / area : 1;
+}
+
+/* *own: of what has points there. */
+static npg_status judge_frame(double *figure, double *own, npg_judging *j, const npg_candidate_cloud *cloud,
+                              const float *vert_unit)
+{
+    double points, surface, seen, behind;
+    NPG_TRY(points_off(&points, j, cloud));
+    if (is_by_images(cloud)) {
+        *figure = *own = points + 2 * nowhere(j, cloud, vert_unit);
+        return NPG_OK;
+    }
+    NPG_TRY(surface_off(&surface, &seen, j, cloud, vert_unit));
+    NPG_TRY(points_behind(&behind, j, cloud));
+    *figure = points + surface + behind;
+    *own = points + seen + behind;
+    return NPG_OK;
+}
+
 npg_status npg_judging_see(void *user, const npg_candidate_cloud *cloud, const float *vert_unit)
 {
     npg_judging *j = user;
     npg_judgement *out = &j->judgement;
-    double points, surface, seen, behind;
+    double figure, own;
     if (j->settings.should_stop && j->settings.should_stop(j->settings.user))
         return npg_error(NPG_STOPPED, "stopped while a reference was judged");
     NPG_TRY(npg_surface_move(j->surface, vert_unit));
-    NPG_TRY(points_off(&points, j, cloud));
-    NPG_TRY(surface_off(&surface, &seen, j, cloud, vert_unit));
-    NPG_TRY(points_behind(&behind, j, cloud));
-    double figure = points + surface + behind;
-    if (cloud == j->own) out->own = points + seen + behind;
+    NPG_TRY(judge_frame(&figure, &own, j, cloud, vert_unit));
+    if (cloud == j->own) out->own = own;
     out->of_frame[cloud - j->clouds->list] = figure;
     out->mean += (figure - out->mean) / (double)++out->count;
     return NPG_OK;
@@ -208,7 +259,8 @@ npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *cloud
 {
     npg_judging *j;
     NPG_TRY(npg_judging_open(&j, clouds, at, mesh, settings));
-    npg_status status = npg_candidate_follow(clouds, at, mesh, &judge_tracking, npg_judging_see, j);
+    const npg_tracker_settings *tracking = is_by_images(j->own) ? &side_tracking : &judge_tracking;
+    npg_status status = npg_candidate_follow(clouds, at, mesh, tracking, npg_judging_see, j);
     *judgement = j->judgement;
     npg_judging_close(&j);
     return status;

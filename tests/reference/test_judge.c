@@ -156,6 +156,61 @@ static void what_no_sensor_sees_needs_no_points(void **state)
     npg_candidate_clouds_close(&unknown);
 }
 
+enum { SIDE = 60 }; /* cells of an image */
+
+/* What a depth camera at z = 4 sees of the ball in frame `index`; around it is nothing. */
+static void fill_cells(float cells[SIDE * SIDE], const npg_depth_view *view, size_t index)
+{
+    for (size_t i = 0; i < SIDE * SIDE; i++) {
+        double u = view->first[0] + view->step * (double)(i % SIDE),
+               v = view->first[1] + view->step * (double)(i / SIDE), depth = 4, inside = 1;
+        for (int step = 0; step < 20 && inside > 0; step++) {
+            double x = (u * depth - (double)STEP * (double)index) / 0.5, y = v * depth / 0.4;
+            inside = 1 - x * x - y * y;
+            depth = 4 - 0.5 * sqrt(fmax(0, inside));
+        }
+        cells[i] = inside > 0 ? (float)depth : INFINITY;
+    }
+}
+
+static void give_images(npg_candidate_clouds *clouds)
+{
+    static const npg_frame_box unit = {.scale = 1};
+    static float cells[SIDE * SIDE];
+    npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 4},
+                           .first = {-0.3, -0.3},
+                           .step = 0.01,
+                           .width = SIDE,
+                           .height = SIDE};
+    const npg_frame frame = {
+        .sensor_count = 1, .views = &view, .view_cells = cells, .view_cell_count = SIDE * SIDE};
+    for (size_t f = 0; f < clouds->count; f++) {
+        fill_cells(cells, &view, f);
+        clouds->list[f].sensors[2] = 4;
+        assert_int_equal(npg_free_space_open(&clouds->list[f].space, &frame, &unit), NPG_OK);
+    }
+}
+
+/* The half of the ball behind x = 0 is drawn out by 1.6, or pressed to a fifth. */
+static void before_one_depth_camera_its_images_judge(void **state)
+{
+    (void)state;
+    npg_candidate_clouds *clouds = sample(true);
+    npg_mesh *right = ball_of(1), *longer = ball_of(1.6f), *lacking = ball_of(0.2f);
+    give_images(clouds);
+    const npg_judgement of_right = told(clouds, right, 0), of_longer = told(clouds, longer, 0),
+                        of_lacking = told(clouds, lacking, 0);
+    print_message("right %.4f, longer %.4f, lacking %.4f\n", of_right.mean, of_longer.mean, of_lacking.mean);
+    assert_true(of_right.mean < 0.02);
+    assert_true(of_longer.mean > 0.1 && of_longer.mean < 1);
+    assert_true(of_lacking.mean > 0.1 && of_lacking.mean < 0.5); /* less than half of the points are */
+    assert_true(judge(clouds, right).mean < 0.02);               /* and as it is followed, too */
+    npg_mesh_unref(&right);
+    npg_mesh_unref(&longer);
+    npg_mesh_unref(&lacking);
+    npg_candidate_clouds_close(&clouds);
+}
+
 static bool stop(void *user)
 {
     return ++*(int *)user > 2;
@@ -192,6 +247,7 @@ int main(void)
         cmocka_unit_test(the_surface_that_fits_is_better),
         cmocka_unit_test(what_is_as_near_as_in_its_own_frame_can_not_be_beaten),
         cmocka_unit_test(what_no_sensor_sees_needs_no_points),
+        cmocka_unit_test(before_one_depth_camera_its_images_judge),
         cmocka_unit_test(it_stops_and_says_where_memory_ends),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
