@@ -12,7 +12,7 @@
 static const npg_tracker_settings judge_tracking = {
     .nodes = 150, .samples = 800, .steps = 8, .stiffness = 0.01, .along = 0.1};
 
-/* Before one depth camera, whose images show what is forgiven: a side of the body has to be found again, not its detail. */
+/* Before one depth camera, whose images show what is forgiven: tests/bed/decisions.md, "The judge". */
 static const npg_tracker_settings side_tracking = {
     .nodes = 400, .samples = 2000, .steps = 12, .stiffness = 0.006, .along = 0.001};
 

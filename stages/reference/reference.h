@@ -15,12 +15,12 @@
  * posed there; s: places of the posed surface, in proportion to the area as the sensors see it (all of it
  * where it is not known where they stood); P_t: all points of the frame; tau: three times as far as points lie
  * apart; b_h: 1 where the posed surface stands between the point and every sensor (0 where none is known).
- * 0 is perfect.  Before one depth camera
+ * 0 is perfect.  Surface that joins what parts, or that is not there in other frames, lies off the points, or
+ * in space that was seen to be empty; points of what the surface lacks lie off the surface.
  *
- *     D_t = share of h farther than its images are sure of + 2 x share of the surface where they show that nothing is
+ * Before one depth camera the images say what is wrong, as in the verdict and by its bars:
  *
- * which is what the verdict asks for, by its bars.  Surface that joins what parts, or that is not there in other frames, lies off the points, or
- * in space that was seen to be empty; points of what the surface lacks lie off the surface. */
+ *     D_t = share of the h that lie farther off than images are sure of + 2 x share of the surface where nothing is */
 
 typedef struct npg_judgement {
     size_t count; /* frames judged */
