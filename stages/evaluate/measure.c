@@ -322,18 +322,6 @@ static npg_status find_in_sight(npg_measure *m, const npg_frame *frame, const np
                             m->vert_unit, NULL, m->normals, mesh->vert_count, spacing);
 }
 
-/* Of the points, farther from the surface than the images are sure of. */
-static double lost_share(const npg_measure *m, const npg_free_space *space, size_t point_count)
-{
-    size_t known = 0, lost = 0;
-    for (size_t i = 0; i < point_count; i++) {
-        double margin = npg_free_space_margin(space, m->points + 3 * i);
-        known += margin > 0;
-        lost += margin > 0 && (double)m->hits[i].dist_sq > margin * margin;
-    }
-    return known ? (double)lost / (double)known : 0;
-}
-
 /* What depth images say: of the area, before what they show or outside of its outline, whichever is more, and of
  * the points. */
 static npg_status measure_by_images(const npg_measure *m, npg_frame *frame, const npg_frame_box *box,
@@ -349,7 +337,7 @@ static npg_status measure_by_images(const npg_measure *m, npg_frame *frame, cons
         beside += kind == NPG_SEEN_BESIDE ? m->vert_areas[i] : 0;
     }
     frame->figures.nowhere_share = whole > 0 ? fmax(before, beside) / whole : 0;
-    frame->figures.lost_share = lost_share(m, space, point_count);
+    frame->figures.lost_share = npg_free_space_lost_share(space, m->points, m->hits, point_count);
     npg_free_space_close(&space);
     return NPG_OK;
 }

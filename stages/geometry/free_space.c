@@ -234,6 +234,18 @@ double npg_free_space_margin(const npg_free_space *space, const float place[3])
     return least;
 }
 
+double npg_free_space_lost_share(const npg_free_space *space, const float *points,
+                                 const npg_surface_hit *hits, size_t count)
+{
+    size_t known = 0, lost = 0;
+    for (size_t i = 0; i < count; i++) {
+        double margin = npg_free_space_margin(space, points + 3 * i);
+        known += margin > 0;
+        lost += margin > 0 && (double)hits[i].dist_sq > margin * margin;
+    }
+    return known ? (double)lost / (double)known : 0;
+}
+
 size_t npg_free_space_memory(size_t sensor_count)
 {
     return sensor_count * (sizeof(view) + (size_t)NPG_VIEW_SIDE * NPG_VIEW_SIDE * 3 * sizeof(float));

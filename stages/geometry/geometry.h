@@ -719,6 +719,11 @@ bool npg_free_space_leave(const npg_free_space *space, float to[3], const float 
  * where none sees it.  Thread-safe. */
 double npg_free_space_margin(const npg_free_space *space, const float place[3]);
 
+/* Of the points that are seen, the share that lies farther than that from the surface (hits: of each its nearest
+ * place there); 0 where none is seen.  Thread-safe. */
+double npg_free_space_lost_share(const npg_free_space *space, const float *points,
+                                 const npg_surface_hit *hits, size_t count);
+
 /* Bytes of one at most. */
 size_t npg_free_space_memory(size_t sensor_count);
 

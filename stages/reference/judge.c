@@ -47,29 +47,17 @@ static bool is_by_images(const npg_candidate_cloud *cloud)
 
 /* ---- both directions ---- */
 
-/* Of a held-out point so far off; *weight 0: images do not tell. */
-static double point_off(double *weight, const npg_judging *j, const npg_candidate_cloud *cloud,
-                        const float point[3], double dist_sq)
-{
-    *weight = 1;
-    if (!is_by_images(cloud)) return rho(j, dist_sq);
-    double margin = npg_free_space_margin(cloud->space, point);
-    *weight = margin > 0;
-    return margin > 0 && dist_sq > margin * margin;
-}
-
 static npg_status points_off(double *mean, const npg_judging *j, const npg_candidate_cloud *cloud)
 {
     npg_arena scratch = {.purpose = NPG_FOR_FIT};
-    npg_surface_hit *hits = npg_arena_take(&scratch, cloud->held_count, sizeof *hits);
+    size_t n = cloud->held_count;
+    npg_surface_hit *hits = npg_arena_take(&scratch, n, sizeof *hits);
     npg_status status = npg_arena_status(&scratch);
-    double sum = 0, asked = 0, weight;
-    if (!status) status = npg_surface_closest_near(j->surface, hits, cloud->held, cloud->held_count, NULL, 1);
-    for (size_t i = 0; i < cloud->held_count && !status; i++) {
-        sum += point_off(&weight, j, cloud, cloud->held + 3 * i, (double)hits[i].dist_sq);
-        asked += weight;
-    }
-    *mean = asked > 0 ? sum / asked : 0;
+    double sum = 0;
+    if (!status) status = npg_surface_closest_near(j->surface, hits, cloud->held, n, NULL, 1);
+    for (size_t i = 0; i < n && !status; i++) sum += rho(j, (double)hits[i].dist_sq);
+    *mean = n ? sum / (double)n : 0;
+    if (!status && is_by_images(cloud)) *mean = npg_free_space_lost_share(cloud->space, cloud->held, hits, n);
     npg_arena_release(&scratch);
     return status;
 }

@@ -65,7 +65,6 @@ struct npg_tracker {
     struct sums {
         double dist, dist_sq, bounded; /* bounded: of the cost                                      */
         size_t compared, explained;    /* that can be of the surface at all; that it has a place for */
-        size_t known, lost;            /* by depth images                                            */
     } * sums;                          /* of each grain of targets */
 };
 
@@ -319,9 +318,6 @@ static void set_targets(const step *s, size_t first, size_t last)
         pull p;
         term->count = 0;
         hit_normal(p.normal, t, hit);
-        double margin = s->cloud->space ? npg_free_space_margin(s->cloud->space, t->targets + 3 * i) : 0;
-        sums.known += margin > 0;
-        sums.lost += margin > 0 && (double)hit->dist_sq > margin * margin;
         sums.bounded += bounded(t, (double)hit->dist_sq);
         if (s->cloud->sensor_count && !could_be_seen(t, s->cloud, hit, t->targets + 3 * i, p.normal))
             continue;
@@ -534,7 +530,7 @@ static void sum_up_samples(npg_tracked *tracked, const npg_tracker *t)
     tracked->chamfer += seen ? sum / (double)seen : 0;
     tracked->cost += both ? cost / (double)both : 0;
     /* twice: half of the samples may be hidden, where nothing tells of them */
-    tracked->astray += 2 * (double)empty / (double)t->sample_count;
+    tracked->astray = 2 * (double)empty / (double)t->sample_count;
 }
 
 static npg_status gather(step *s)
@@ -568,8 +564,6 @@ static void sum_up(npg_tracked *tracked, const npg_tracker *t, bool by_images)
         all.compared += t->sums[g].compared;
         all.explained += t->sums[g].explained;
         all.bounded += t->sums[g].bounded;
-        all.known += t->sums[g].known;
-        all.lost += t->sums[g].lost;
     }
     double share = 1 / (double)(all.compared ? all.compared : t->target_count);
     tracked->point_dist_mean = share * all.dist;
@@ -577,7 +571,6 @@ static void sum_up(npg_tracked *tracked, const npg_tracker *t, bool by_images)
     tracked->explained = (double)all.explained / (double)t->target_count;
     tracked->chamfer = tracked->point_dist_sq;
     tracked->cost = all.bounded / (double)t->target_count;
-    tracked->astray = all.known ? (double)all.lost / (double)all.known : 0;
     sum_up_samples(tracked, t);
     tracked->by_images = by_images;
     if (!by_images) tracked->cost = tracked->chamfer;
@@ -637,6 +630,8 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
         status = do_step(&s, tracked, pose);
         if (s.is_settling && tracked->change < NPG_SETTLED * t->graph->radius) break;
     }
+    if (!status && cloud->space)
+        tracked->astray += npg_free_space_lost_share(cloud->space, t->targets, t->hits, t->target_count);
     npg_kdtree_close(&tree);
     return status;
 }
