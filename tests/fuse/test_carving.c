@@ -10,6 +10,7 @@
 
 #include "fuse/fuse_internal.h"
 #include "tests/support/ball_mesh.h"
+#include "tests/support/image_space.h"
 #include "tests/support/shapes.h"
 
 /* The reference is a ball of radius 0.5 (0.4 along y) that has swallowed a pit: the body has, where z > 0.3,
@@ -166,18 +167,10 @@ static void see_screen(const capture *c, float z)
 {
     enum { WIDTH = 80 };
     static float image[WIDTH * WIDTH];
-    static const npg_frame_box box = {.scale = 1};
-    npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4},
-                           .first = {-0.4, -0.4},
-                           .step = 0.01,
-                           .width = WIDTH,
-                           .height = WIDTH};
-    const npg_frame frame = {
-        .sensor_count = 1, .views = &view, .view_cells = image, .view_cell_count = WIDTH * WIDTH};
     npg_seen seen = {.sensor_count = 1};
     for (int i = 0; i < WIDTH * WIDTH; i++) image[i] = 4 + z;
     npg_skin_pose(c->carry, c->mesh->vert_pos);
-    assert_int_equal(npg_free_space_open(&seen.space, &frame, &box), NPG_OK);
+    seen.space = image_space(image, WIDTH, image_from_below);
     assert_int_equal(npg_carving_see(c->cells, c->carry, &seen), NPG_OK);
     npg_free_space_close(&seen.space);
 }

@@ -11,6 +11,7 @@
 #include "pipeline/random.h"
 #include "reference/reference.h"
 #include "tests/support/ball_mesh.h"
+#include "tests/support/image_space.h"
 
 enum { FRAMES = 7, POINTS = 1500 };
 #define STEP 0.02f /* along x, from frame to frame */
@@ -159,11 +160,11 @@ static void what_no_sensor_sees_needs_no_points(void **state)
 enum { SIDE = 60 }; /* cells of an image */
 
 /* What a depth camera at z = 4 sees of the ball in frame `index`; around it is nothing. */
-static void fill_cells(float cells[SIDE * SIDE], const npg_depth_view *view, size_t index)
+static void fill_cells(float cells[SIDE * SIDE], size_t index)
 {
     for (size_t i = 0; i < SIDE * SIDE; i++) {
-        double u = view->first[0] + view->step * (double)(i % SIDE),
-               v = view->first[1] + view->step * (double)(i / SIDE), depth = 4, inside = 1;
+        double u = image_first(SIDE) + IMAGE_STEP * (double)(i % SIDE),
+               v = image_first(SIDE) + IMAGE_STEP * (double)(i / SIDE), depth = 4, inside = 1;
         for (int step = 0; step < 20 && inside > 0; step++) {
             double x = (u * depth - (double)STEP * (double)index) / 0.5, y = v * depth / 0.4;
             inside = 1 - x * x - y * y;
@@ -175,19 +176,12 @@ static void fill_cells(float cells[SIDE * SIDE], const npg_depth_view *view, siz
 
 static void give_images(npg_candidate_clouds *clouds)
 {
-    static const npg_frame_box unit = {.scale = 1};
+    static const double from_above[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 4};
     static float cells[SIDE * SIDE];
-    npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 4},
-                           .first = {-0.3, -0.3},
-                           .step = 0.01,
-                           .width = SIDE,
-                           .height = SIDE};
-    const npg_frame frame = {
-        .sensor_count = 1, .views = &view, .view_cells = cells, .view_cell_count = SIDE * SIDE};
     for (size_t f = 0; f < clouds->count; f++) {
-        fill_cells(cells, &view, f);
+        fill_cells(cells, f);
         clouds->list[f].sensors[2] = 4;
-        assert_int_equal(npg_free_space_open(&clouds->list[f].space, &frame, &unit), NPG_OK);
+        clouds->list[f].space = image_space(cells, SIDE, from_above);
     }
 }
 

@@ -11,6 +11,7 @@
 
 #include "geometry/geometry.h"
 #include "tests/support/ball_mesh.h"
+#include "tests/support/image_space.h"
 #include "track/track.h"
 
 static void thin_meshes_are_made_of_the_whole_one_s_vertices(void **state)
@@ -128,22 +129,6 @@ static void a_piece_without_points_goes_along(void **state)
 
 enum { SIDE = 60 }; /* cells of an image */
 
-/* What a sensor at (0, 0, -4) says, which looks along z. */
-static npg_free_space *space_of(float cells[SIDE * SIDE])
-{
-    static const npg_frame_box unit = {.scale = 1};
-    npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4},
-                           .first = {-0.3, -0.3},
-                           .step = 0.01,
-                           .width = SIDE,
-                           .height = SIDE};
-    const npg_frame frame = {
-        .sensor_count = 1, .views = &view, .view_cells = cells, .view_cell_count = SIDE * SIDE};
-    npg_free_space *space;
-    assert_int_equal(npg_free_space_open(&space, &frame, &unit), NPG_OK);
-    return space;
-}
-
 /* How far the second ball moves towards the first, of which alone there are points, in three fits. */
 static double moved_inward(const npg_free_space *space)
 {
@@ -182,7 +167,7 @@ static void surface_where_nothing_is_is_pulled_out(void **state)
         double x = (i % SIDE + 0.5) / 100 - 0.3, y = (i / SIDE + 0.5) / 100 - 0.3;
         cells[i] = hypot(x, y) < 0.125 ? 3.5F : INFINITY;
     }
-    npg_free_space *space = space_of(cells);
+    npg_free_space *space = image_space(cells, SIDE, image_from_below);
     double without = moved_inward(NULL), with = moved_inward(space);
     print_message("the second ball moved by %.4f, where nothing says that it can't be there by %.4f\n", with,
                   without);
@@ -231,7 +216,7 @@ static void what_has_left_empty_space_stays_out(void **state)
     (void)state;
     for (int i = 0; i < SIDE * SIDE; i++) /* nothing above and where the right half is, something below it */
         cells[i] = i % SIDE < SIDE / 2 || i / SIDE < SIDE / 2 - 3 ? 4 : INFINITY;
-    npg_free_space *space = space_of(cells);
+    npg_free_space *space = image_space(cells, SIDE, image_from_below);
     double even = left_in_empty_space(space, 14), odd = left_in_empty_space(space, 15);
     print_message("in empty space after 14 steps %.3f, after 15 %.3f\n", even, odd);
     assert_true(even < 0.05 && odd < 0.05);
