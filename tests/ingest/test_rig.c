@@ -369,6 +369,8 @@ static const struct {
     {WITH("\"colour\": \"late_%04d.png\""), "frame 0 has a depth image, but none of these"},
     {WITH_POSE("1, 0, 0"), "pose: must be 16 numbers"},
     {WITH_POSE("1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,1,1"), "its last row must be 0 0 0 1"},
+    {WITH_POSE("[1,0,0,0], [0,1,0,0], [0,0,1,0], [0,0,1,1]"), "its last row must be 0 0 0 1"},
+    {WITH_POSE("[1,0,0,0], [0,1,0,0], [0,0,1,0], [0,0,0,1,1]"), "has more numbers"},
     {WITH_POSE("1,0,0,0, 0,1,0,0, 0,0,2,0, 0,0,0,1"), "sensors[0].pose: the pose is no rotation"},
     {WITH_POSE("1,0,0,0, 0,1,0,0, 0,0,-1,0, 0,0,0,1"), "a mirror"},
     {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 50, \"fy\": 50, \"cx\": 20"),

@@ -76,7 +76,7 @@ static npg_status take(const char *at, const json_t *object, const member *keys,
     return NPG_OK;
 }
 
-/* Up to `most` numbers; *count says how many there are. */
+/* Up to `most` numbers, in one list or in rows; *count says how many there are. */
 static npg_status get_numbers(const char *at, const char *key, const json_t *found, double *values,
                               size_t most, size_t *count)
 {
@@ -84,7 +84,13 @@ static npg_status get_numbers(const char *at, const char *key, const json_t *fou
     if (!json_is_array(found)) return bad(at, key, "must be a list of numbers");
     for (size_t i = 0; i < json_array_size(found); i++) {
         const json_t *item = json_array_get(found, i);
-        if (i >= most) return bad(at, key, "has more numbers than it may have");
+        if (json_is_array(item)) {
+            size_t more;
+            NPG_TRY(get_numbers(at, key, item, values + *count, most - *count, &more));
+            *count += more;
+            continue;
+        }
+        if (*count >= most) return bad(at, key, "has more numbers than it may have");
         if (!json_is_number(item) || !isfinite(json_number_value(item)))
             return bad(at, key, "must be a list of finite numbers");
         values[(*count)++] = json_number_value(item);
