@@ -164,9 +164,9 @@ EOF
     run "$NEUPIG" run in -o out --confidence=constant
     [ "$status" -eq 2 ]
     [[ "$output" == *"--method '{\"confidence\": \"constant\"}'"* ]]
-    run "$NEUPIG" run in -o out --rotation=cayley
+    run "$NEUPIG" run in -o out --depth-near=1
     [ "$status" -eq 2 ]
-    [[ "$output" == *"went: "*quaternion* ]]
+    [[ "$output" == *"went: --depth-range A:"* ]]
     run "$NEUPIG" batch in -o out --dry-run
     [ "$status" -eq 2 ]
     [[ "$output" == *"option --dry-run went: neupig probe"* ]]
