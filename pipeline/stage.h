@@ -75,6 +75,7 @@ typedef struct npg_brief {
     bool takes_gathered; /* the next reference is made from what was gathered ...   */
     bool takes_poses;    /* ... and the poses found are good to start from; else frames are followed anew */
     int64_t gathers_from, gathers_to; /* index of the first and last frame whose points are gathered */
+    bool is_last_look;      /* ... shows what frames contradict of the last ones: the next reference ...    */
     bool trims_only;        /* ... is the one so far, without what the frames that were followed contradict */
     bool is_side;           /* the reference is a side of the body, of which sensors see a part in a frame */
     int64_t growing_passes; /* through which a reference that was one side of the body has grown so far ... */

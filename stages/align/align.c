@@ -211,7 +211,9 @@ static npg_status count_hidden(const npg_worker *worker, npg_waiting *w, npg_sid
 static npg_status fit_pose(npg_worker *worker, npg_waiting *w, npg_side *at)
 {
     const state *s = npg_worker_state(worker);
-    const npg_tracker_effort again = npg_tracker_again(s->tracker);
+    npg_tracker_effort again = npg_tracker_again(s->tracker);
+    /* What is new comes along with what was there, and where that stands is all that is asked. */
+    if (npg_worker_facts(worker)->brief.is_last_look) again.steps = 1;
     NPG_TRY(npg_pose_cache_start(&s->cache, s->tracker, w->frame.index, at->now, &w->is_known));
     if (w->cloud.count) {
         const npg_prior_poses prior = {.pose =

@@ -96,9 +96,10 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
     loop->unreached_before = result->unreached_count;
     brief->rounds_left -= !brief->is_growing && !is_whole_now;
     /* What was gathered last is followed by nothing yet that could contradict it. */
-    brief->trims_only = loop->is_last_look;
-    loop->is_last_look = !loop->is_last_look && !brief->rounds_left && result->is_side && result->has_images;
-    brief->rounds_left += loop->is_last_look;
+    brief->trims_only = brief->is_last_look;
+    brief->is_last_look =
+        !brief->is_last_look && !brief->rounds_left && result->is_side && result->has_images;
+    brief->rounds_left += brief->is_last_look;
     /* A side of the body never explains all. */
     brief->is_side = result->is_side;
     brief->takes_gathered = result->is_side || !result->has_changed || loop->is_limited;

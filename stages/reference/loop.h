@@ -39,8 +39,7 @@ typedef struct npg_reference_loop {
     npg_pass_result trial;                        /* ... after the pass that came to this  */
     int64_t unreached_before;                     /* of the pass before ...                             */
     int64_t in_vain;                              /* ... and passes in a row that reached no more since */
-    bool is_last_look;                            /* the pass to come is walked for what it contradicts */
-    bool is_limited;                              /* ... for what it explains alone                     */
+    bool is_limited;                              /* the pass to come is for what it explains alone     */
 } npg_reference_loop;
 
 /* The brief of the first pass, of `rounds` that are to gather points. */
