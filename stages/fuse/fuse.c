@@ -380,38 +380,17 @@ static npg_status begin(npg_worker *worker)
     return NPG_OK;
 }
 
-/* Handles of the keyframe's draft, with which others would be compared: a finer surface has small ones of noise. */
-static npg_status draft_handles(int64_t *handles, npg_worker *worker)
-{
-    const npg_facts *facts = npg_worker_facts(worker);
-    const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
-    const npg_candidate_cloud *own = &clouds->list[npg_candidate_clouds_find(clouds, facts->plan.key)];
-    npg_poisson_settings settings = npg_poisson_settings_of(npg_worker_options(worker));
-    npg_mesh *draft;
-    double spacing;
-    settings.should_stop = npg_worker_should_stop;
-    settings.user = worker;
-    NPG_TRY(npg_cloud_spacing(&spacing, own->points, own->point_count));
-    NPG_TRY(npg_mesh_draft(&draft, own->fit, own->fit_normals, own->fit_count, spacing, own->sensor_count > 0,
-                           &settings));
-    npg_status status = npg_mesh_handles(handles, draft);
-    npg_mesh_unref(&draft);
-    return status;
-}
-
 /* Whether another keyframe could do better than the one that is tried: parts that touch in it are joined, or points
  * are farther from its surface than their own would be. */
 static npg_status is_beatable(bool *beatable, npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    int64_t handles = 0;
+    int64_t handles;
     *beatable = false;
     if (!s->judging) return NPG_OK;
     const npg_judgement *found = npg_judging_found(s->judging);
-    *beatable = !npg_judged_least(found);
-    if (!*beatable) NPG_TRY(npg_mesh_handles(&handles, npg_worker_facts(worker)->reference));
-    if (handles) NPG_TRY(draft_handles(&handles, worker));
-    *beatable |= handles > 0;
+    NPG_TRY(npg_mesh_handles(&handles, npg_worker_facts(worker)->reference));
+    *beatable = handles > 0 || !npg_judged_least(found);
     json_object_update_new(npg_worker_report(worker),
                            json_pack("{sf sf}", "judged", found->mean, "judged_own", found->own));
     return NPG_OK;

@@ -21,7 +21,8 @@ typedef struct mesh_state {
     double point_weight;
     bool holds_apart;
     double invented_max;
-    bool is_made; /* the reference of this pass */
+    bool is_made;  /* the reference of this pass          */
+    bool is_again; /* one that is made has been made before */
 } mesh_state;
 
 #define AT(member) offsetof(mesh_state, member)
@@ -76,11 +77,12 @@ npg_poisson_settings npg_poisson_settings_of(const npg_options *options)
 
 typedef struct making { /* what is known while the reference is made */
     npg_worker *worker;
-    const mesh_state *state;
+    mesh_state *state;
     const npg_frame *key;
     const npg_fused *fused; /* what all frames saw, a loan; NULL: it is made of the keyframe alone */
     npg_point_set set;      /* the points of either, owned */
     double invented_share;  /* of the area: what no point saw and was kept, or was given */
+    int64_t handles;        /* of the mesh */
     npg_mesh *mesh;         /* owned */
 } making;
 
@@ -103,6 +105,8 @@ void npg_mesh_warn(npg_worker *worker, bool partial, int64_t frame, const char *
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
+    const mesh_state *s = npg_worker_state(worker);
+    if (s->is_again) return;
     if (npg_worker_pass(worker) == NPG_PASS_SOLVE)
         npg_worker_warn(worker, partial, frame, "%s", text);
     else
@@ -111,11 +115,13 @@ void npg_mesh_warn(npg_worker *worker, bool partial, int64_t frame, const char *
 
 /* ---- from points ---- */
 
-static npg_status make(making *m)
+/* Of an octree that is less deep by `coarser` steps. */
+static npg_status make(making *m, int coarser)
 {
     npg_reconstruct_settings settings = m->state->surface;
     int64_t may_use = npg_worker_settings(m->worker)->max_memory_mib;
     settings.poisson = poisson_settings(m->state);
+    settings.poisson.depth -= coarser;
     if (may_use > POISSON_MEMORY_MIB) settings.poisson.memory_limit = (size_t)may_use << 20;
     settings.poisson.should_stop = npg_worker_should_stop;
     settings.poisson.user = m->worker;
@@ -232,11 +238,10 @@ static npg_status measure_reference(making *m)
 {
     npg_manifold manifold;
     npg_mesh *mesh = m->mesh;
-    int64_t handles;
     NPG_TRY(npg_mesh_manifold(&manifold, mesh));
-    NPG_TRY(npg_mesh_handles(&handles, mesh));
+    NPG_TRY(npg_mesh_handles(&m->handles, mesh));
     NPG_TRY(npg_mesh_make_normals(mesh));
-    npg_mesh_note(m->worker, "handles", (double)handles);
+    npg_mesh_note(m->worker, "handles", (double)m->handles);
     npg_mesh_note_count(m->worker, "vertices", mesh->vert_count);
     npg_mesh_note_count(m->worker, "faces", mesh->face_count);
     npg_mesh_note_count(m->worker, "border_edges", manifold.border_edges);
@@ -304,32 +309,20 @@ static npg_status close_over(making *m)
 
 /* ---- keep it, or take it back ---- */
 
-/* Where the one before left nothing to explain in any frame, points are where they belong, and what was gathered of
- * them shows in the keyframe what it is worth. */
-static npg_status judge_reference(npg_judgement *judgement, const npg_candidate_clouds *clouds, size_t at,
-                                  npg_mesh *mesh, const npg_judge_settings *settings, bool in_key_alone)
-{
-    npg_judging *judging;
-    if (!in_key_alone) return npg_judge(judgement, clouds, at, mesh, settings);
-    NPG_TRY(npg_judging_open(&judging, clouds, at, mesh, settings));
-    npg_status status = npg_judging_see(judging, &clouds->list[at], mesh->vert_pos);
-    *judgement = *npg_judging_found(judging);
-    npg_judging_close(&judging);
-    return status;
-}
-
-/* Judge the new reference and the one before it by what points of the sampled frames say. */
+/* Judge the new reference and the one before it by what points of the sampled frames say.  Where that left nothing to
+ * explain in any frame, points are where they belong, and the keyframe shows what was gathered of them.
+ * *is_worse stays as it is where nothing can be said. */
 static npg_status compare(bool *is_worse, making *m, const npg_candidate_clouds *clouds, npg_mesh *before)
 {
     npg_judgement now, then;
-    npg_judge_settings settings = {.should_stop = npg_worker_should_stop, .user = m->worker};
-    size_t at = npg_candidate_clouds_find(clouds, m->key->index);
     bool is_explained = npg_worker_facts(m->worker)->choice.is_tried;
-    *is_worse = false;
+    npg_judge_settings settings = {
+        .in_own_alone = is_explained, .should_stop = npg_worker_should_stop, .user = m->worker};
+    size_t at = npg_candidate_clouds_find(clouds, m->key->index);
     if (at == clouds->count) return NPG_OK;
     NPG_TRY(npg_cloud_spacing(&settings.spacing_unit, clouds->list[at].points, clouds->list[at].point_count));
-    NPG_TRY(judge_reference(&then, clouds, at, before, &settings, is_explained));
-    NPG_TRY(judge_reference(&now, clouds, at, m->mesh, &settings, is_explained));
+    NPG_TRY(npg_judge(&then, clouds, at, before, &settings));
+    NPG_TRY(npg_judge(&now, clouds, at, m->mesh, &settings));
     npg_mesh_note(m->worker, "judged", now.mean);
     npg_mesh_note(m->worker, "judged_before", then.mean);
     *is_worse = is_explained ? npg_judged_clearly(&then, &now) : npg_judged_better(&then, &now);
@@ -357,6 +350,37 @@ static npg_status take_back_if_worse(making *m)
     return NPG_OK;
 }
 
+/* Layers of sensors that lie beside each other, and noise, make handles of small cells; those that larger cells
+ * leave are the body's own, or of points that lie so. */
+static npg_status try_larger_cells(making *m)
+{
+    const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
+    bool is_growing = npg_worker_facts(m->worker)->brief.is_growing, is_worse = true;
+    making fine = *m;
+    if (!m->fused || !clouds || !m->handles || m->state->depth || is_growing) return NPG_OK;
+    json_t *report = npg_worker_report(m->worker), *of_fine = json_copy(report);
+    m->mesh = NULL;
+    m->state->is_again = true;
+    npg_status status = make(m, 1);
+    m->state->is_again = false;
+    if (!status) status = measure_reference(m);
+    if (!status && (double)m->handles < NPG_MAJORITY * (double)fine.handles)
+        status = compare(&is_worse, m, clouds, fine.mesh);
+    npg_worker_log(m->worker, NPG_LOG_INFO, m->key->number,
+                   "of larger cells the surface has %lld handles, not %lld: %s", (long long)m->handles,
+                   (long long)fine.handles, is_worse ? "it is not taken" : "it is taken");
+    npg_mesh_unref(is_worse ? &m->mesh : &fine.mesh);
+    if (is_worse) {
+        *m = fine;
+        json_object_clear(report);
+        json_object_update(report, of_fine);
+    } else {
+        npg_mesh_note_count(m->worker, "handles_of_small_cells", (size_t)fine.handles);
+    }
+    json_decref(of_fine);
+    return status == NPG_DIVERGED || status == NPG_FAILED ? NPG_OK : status;
+}
+
 /* ---- one reference ---- */
 
 /* The points and normals of fused (or NULL) are taken from it. */
@@ -367,8 +391,9 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     bool trims = fused && fused->empty && npg_worker_facts(worker)->brief.trims_only;
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
-    if (!status) status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);
+    if (!status) status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m, 0);
     if (!status) status = measure_reference(&m);
+    if (!status && !trims) status = try_larger_cells(&m);
     if (!status && !trims) status = take_back_if_worse(&m);
     if (!status) status = close_over(&m);
     if (!status) status = judge_invented(&m);

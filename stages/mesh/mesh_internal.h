@@ -19,7 +19,7 @@ void npg_mesh_note(npg_worker *worker, const char *key, double value);
 void npg_mesh_note_count(npg_worker *worker, const char *key, size_t value);
 
 /* As npg_worker_warn(), of the reference that the run delivers; what is said of those before it (in fusing
- * passes) is for the log alone. */
+ * passes) is for the log alone, and of one that is made again of other cells nothing. */
 void npg_mesh_warn(npg_worker *worker, bool partial, int64_t frame, const char *format, ...) NPG_PRINTF(4, 5);
 
 /* Point set: the points that the reference is made from, of the keyframe or of all frames, and how dense they
@@ -38,6 +38,8 @@ typedef struct npg_point_set {
     double seen_dist;       /* a place was seen when a point is nearer than this          */
     double key_spacing;     /* where is_fused, of the keyframe's points; else 0           */
     double key_noise;       /* of the same, across the surface                            */
+    bool is_smooth;         /* smoothed as far as their noise asks for it ...             */
+    bool is_rough;          /* ... as a frame's are noisy beyond doubt                    */
     npg_cube_set *empty;    /* space that sensors saw to be empty, owned; NULL: not known */
 } npg_point_set;
 

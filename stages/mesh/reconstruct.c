@@ -19,7 +19,6 @@ typedef struct reconstruction { /* what is known while the mesh is made */
     npg_worker *worker;
     const npg_reconstruct_settings *settings;
     npg_point_set *set;
-    bool is_rough;         /* the points were smoothed, and a frame's are noisy beyond doubt */
     bool trims_unseen;     /* nobody saw a side: what has no points near it goes             */
     double invented_share; /* of the mesh, once it is trimmed: what no point saw             */
     npg_mesh *mesh;        /* so far; owned                                                  */
@@ -32,6 +31,8 @@ static npg_status smooth(reconstruction *r)
 {
     npg_point_set *p = r->set;
     double sigma;
+    if (p->is_smooth) return NPG_OK;
+    p->is_smooth = true;
     NPG_TRY(npg_cloud_noise(&sigma, p->points, p->normals, p->count));
     npg_mesh_note(r->worker, "noise_unit", sigma);
     if (!r->settings->smooth || sigma < NOISE_MIN * p->spacing) return NPG_OK;
@@ -39,7 +40,7 @@ static npg_status smooth(reconstruction *r)
                    "the points of %s are noisy (%.2g of the unit box): smoothed for the reconstruction",
                    p->is_fused ? "all frames" : "the keyframe", sigma);
     double key_noise = p->is_fused ? p->key_noise : sigma;
-    r->is_rough = key_noise > NOISY * (p->is_fused ? p->key_spacing : p->spacing);
+    p->is_rough = key_noise > NOISY * (p->is_fused ? p->key_spacing : p->spacing);
     return npg_cloud_smooth(p->points, p->normals, p->count,
                             p->is_fused ? FUSED_NEIGHBOURS : SMOOTH_NEIGHBOURS);
 }
@@ -52,7 +53,7 @@ static npg_status draw_through(reconstruction *r, size_t *moved)
     float *points, *normals;
     size_t count;
     /* noisy normals do not say what lies between, nor those that were estimated across both sides */
-    if (r->is_rough || !p->has_given_normals)
+    if (p->is_rough || !p->has_given_normals)
         return npg_poisson_apart(&r->mesh, moved, p->points, p->normals, p->count, p->spacing, settings);
     NPG_TRY(npg_cloud_densify(&points, &normals, &count, p->points, p->normals, p->count, p->spacing));
     npg_mesh_note_count(r->worker, "points_between", count - p->count);
@@ -223,7 +224,7 @@ static npg_status decimate(reconstruction *r)
 static npg_status turn_faces(reconstruction *r)
 {
     npg_mending mending;
-    if (!r->is_rough) return NPG_OK;
+    if (!r->set->is_rough) return NPG_OK;
     NPG_TRY(npg_mesh_denoise(r->mesh, r->set->points, r->set->normals, r->set->count));
     return npg_mesh_mend(&r->mesh, &mending);
 }

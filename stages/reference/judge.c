@@ -33,11 +33,6 @@ struct npg_judging {
     npg_visible visible;
 };
 
-static double rho(const npg_judging *j, double dist_sq)
-{
-    return fmin(dist_sq, j->tau_sq) / j->tau_sq;
-}
-
 /* One camera sees a side that seldom is the whole body's: what points say of its detail is more than what they say of a
  * limb that it lacks.  So there counts what its images call wrong, as the verdict has it. */
 static bool is_by_images(const npg_candidate_cloud *cloud)
@@ -55,7 +50,7 @@ static npg_status points_off(double *mean, const npg_judging *j, const npg_candi
     npg_status status = npg_arena_status(&scratch);
     double sum = 0;
     if (!status) status = npg_surface_closest_near(j->surface, hits, cloud->held, n, NULL, 1);
-    for (size_t i = 0; i < n && !status; i++) sum += rho(j, (double)hits[i].dist_sq);
+    for (size_t i = 0; i < n && !status; i++) sum += fmin(1, (double)hits[i].dist_sq / j->tau_sq);
     *mean = n ? sum / (double)n : 0;
     if (!status && is_by_images(cloud)) *mean = npg_free_space_lost_share(cloud->space, cloud->held, hits, n);
     npg_arena_release(&scratch);
@@ -144,7 +139,7 @@ static npg_status surface_off(double *mean, double *seen, npg_judging *j, const 
     for (size_t i = 0; i < v; i++) {
         bool is_nowhere = npg_free_space_is_empty(cloud->space, vert_unit + 3 * i);
         double weight = j->areas[i] * (is_nowhere ? 1 : expected(j, cloud, vert_unit, i));
-        double off = weight * (is_nowhere ? 1 : rho(j, (double)j->dist_sq[i]));
+        double off = weight * (is_nowhere ? 1 : fmin(1, (double)j->dist_sq[i] / j->tau_sq));
         sum += off;
         area += weight;
         if (off < weight) seen_sum += off;
@@ -248,7 +243,9 @@ npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *cloud
     npg_judging *j;
     NPG_TRY(npg_judging_open(&j, clouds, at, mesh, settings));
     const npg_tracker_settings *tracking = is_by_images(j->own) ? &side_tracking : &judge_tracking;
-    npg_status status = npg_candidate_follow(clouds, at, mesh, tracking, npg_judging_see, j);
+    npg_status status = settings->in_own_alone
+                            ? npg_judging_see(j, j->own, mesh->vert_pos)
+                            : npg_candidate_follow(clouds, at, mesh, tracking, npg_judging_see, j);
     *judgement = j->judgement;
     npg_judging_close(&j);
     return status;

@@ -31,11 +31,12 @@ typedef struct npg_judgement {
 
 typedef struct npg_judge_settings {
     double spacing_unit;             /* of the sampled points; the same for all that are compared */
+    bool in_own_alone;               /* in the frame that the surface was made from, and nowhere else */
     bool (*should_stop)(void *user); /* or NULL */
     void *user;
 } npg_judge_settings;
 
-/* mesh (unit coordinates, with normals) is of the frame at list[at], which is not judged.
+/* mesh (unit coordinates, with normals) is of the frame at list[at], which is judged where it alone is to be.
  * NPG_MEMORY, NPG_STOPPED, NPG_DIVERGED. */
 npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *clouds, size_t at, npg_mesh *mesh,
                      const npg_judge_settings *settings);

@@ -77,6 +77,15 @@ better() {
     [ "$output" = "no point of any frame saw it" ]
 }
 
+@test "layers of sensors that lie beside each other: larger cells leave fewer handles" {
+    python3 "${BATS_TEST_DIRNAME:?}/layered_body.py" layers
+    run "$NEUPIG" run layers/points -o layered --keyframe 1
+    echo "$output"
+    [[ "$output" == *"of larger cells the surface has"*"it is taken"* ]]
+    handles() { sed -n 's/.*"'"$1"'": \([0-9]*\).*/\1/p' layered/report.json | tail -1; }
+    [ "$(handles handles_of_small_cells)" -gt $((2 * $(handles handles))) ]
+}
+
 # Kill a run into $1 in its solving pass, once it has a state.
 kill_in_solving() {
     rm -rf "$1"
