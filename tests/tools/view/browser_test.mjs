@@ -404,8 +404,12 @@ async function live(page, [run, pid]) {
             { timeout: 60000 },
         );
     await shown(2);
-    const progress = await page.locator("#progress-text").textContent();
-    expect(progress === "solving: 2 of 6 frames", progress);
+    /* A frame is there before the page has done loading, and says how the run goes on. */
+    await page.waitForFunction(
+        () => document.getElementById("progress-text").textContent === "solving: 2 of 6 frames",
+        null,
+        { timeout: 60000 },
+    );
     const before = await pictureOf(page);
     const lines = fs.readFileSync(path.join(run, "all.jsonl"), "utf8").trim().split("\n");
     fs.writeFileSync(
