@@ -75,9 +75,9 @@ typedef struct npg_brief {
     bool takes_gathered; /* the next reference is made from what was gathered ...   */
     bool takes_poses;    /* ... and the poses found are good to start from; else frames are followed anew */
     int64_t gathers_from, gathers_to; /* index of the first and last frame whose points are gathered */
-    bool is_last_look;      /* ... shows what frames contradict of the last ones: the next reference ...    */
-    bool trims_only;        /* ... is the one so far, without what the frames that were followed contradict */
-    bool is_side;           /* the reference is a side of the body, of which sensors see a part in a frame */
+    bool is_last_look; /* the pass is walked for what frames contradict of what was gathered last, no more */
+    bool trims_only;   /* the next reference is the one so far, without what the frames followed contradict */
+    bool is_side;      /* the reference is a side of the body, of which sensors see a part in a frame */
     int64_t growing_passes; /* through which a reference that was one side of the body has grown so far ... */
     bool is_growing;        /* ... and goes on to: the next one is not closed                               */
     double explained_least; /* share of a frame's points that a growing reference that bends must have places

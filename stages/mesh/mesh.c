@@ -21,8 +21,8 @@ typedef struct mesh_state {
     double point_weight;
     bool holds_apart;
     double invented_max;
-    bool is_made;  /* the reference of this pass          */
-    bool is_again; /* one that is made has been made before */
+    bool is_made;          /* the reference of this pass                                              */
+    bool is_larger_celled; /* a second surface is made, of an octree less deep by a step: no warning twice */
 } mesh_state;
 
 #define AT(member) offsetof(mesh_state, member)
@@ -61,7 +61,8 @@ static int depth_for(double faces)
 
 static npg_poisson_settings poisson_settings(const mesh_state *s)
 {
-    return (npg_poisson_settings){.depth = s->depth ? (int)s->depth : depth_for((double)s->surface.face_max),
+    int depth = s->depth ? (int)s->depth : depth_for((double)s->surface.face_max);
+    return (npg_poisson_settings){.depth = depth - s->is_larger_celled,
                                   .point_weight = s->point_weight,
                                   .holds_apart = s->holds_apart,
                                   .time_limit_s = POISSON_TIME_S,
@@ -100,13 +101,13 @@ void npg_mesh_note_count(npg_worker *worker, const char *key, size_t value)
 
 void npg_mesh_warn(npg_worker *worker, bool partial, int64_t frame, const char *format, ...)
 {
+    const mesh_state *s = npg_worker_state(worker);
     char text[512];
     va_list arguments;
+    if (s->is_larger_celled) return;
     va_start(arguments, format);
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    const mesh_state *s = npg_worker_state(worker);
-    if (s->is_again) return;
     if (npg_worker_pass(worker) == NPG_PASS_SOLVE)
         npg_worker_warn(worker, partial, frame, "%s", text);
     else
@@ -115,13 +116,11 @@ void npg_mesh_warn(npg_worker *worker, bool partial, int64_t frame, const char *
 
 /* ---- from points ---- */
 
-/* Of an octree that is less deep by `coarser` steps. */
-static npg_status make(making *m, int coarser)
+static npg_status make(making *m)
 {
     npg_reconstruct_settings settings = m->state->surface;
     int64_t may_use = npg_worker_settings(m->worker)->max_memory_mib;
     settings.poisson = poisson_settings(m->state);
-    settings.poisson.depth -= coarser;
     if (may_use > POISSON_MEMORY_MIB) settings.poisson.memory_limit = (size_t)may_use << 20;
     settings.poisson.should_stop = npg_worker_should_stop;
     settings.poisson.user = m->worker;
@@ -360,9 +359,9 @@ static npg_status try_larger_cells(making *m)
     if (!m->fused || !clouds || !m->handles || m->state->depth || is_growing) return NPG_OK;
     json_t *report = npg_worker_report(m->worker), *of_fine = json_copy(report);
     m->mesh = NULL;
-    m->state->is_again = true;
-    npg_status status = make(m, 1);
-    m->state->is_again = false;
+    m->state->is_larger_celled = true;
+    npg_status status = make(m);
+    m->state->is_larger_celled = false;
     if (!status) status = measure_reference(m);
     if (!status && (double)m->handles < NPG_MAJORITY * (double)fine.handles)
         status = compare(&is_worse, m, clouds, fine.mesh);
@@ -391,7 +390,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     bool trims = fused && fused->empty && npg_worker_facts(worker)->brief.trims_only;
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
-    if (!status) status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m, 0);
+    if (!status) status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);
     if (!status) status = measure_reference(&m);
     if (!status && !trims) status = try_larger_cells(&m);
     if (!status && !trims) status = take_back_if_worse(&m);

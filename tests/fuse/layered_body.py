@@ -11,6 +11,8 @@ import os
 import random
 import sys
 
+import ascii_ply
+
 FRAMES, POINTS, SENSORS = 4, 30000, 10
 AXES = (0.5, 1.0, 0.3)
 LAYER, NOISE = 0.02, 0.003  # deviations: of each sensor's place, and of its depths
@@ -43,14 +45,9 @@ def main(out):
     sensors = [(math.cos(turn), 0, math.sin(turn)) for turn in turns]
     offsets = [[chance.gauss(0, LAYER) for _ in range(3)] for _ in sensors]
     for frame in range(FRAMES):
-        with open(f"{out}/points/{frame:04}.ply", "w") as file:
-            print(f"ply\nformat ascii 1.0\nelement vertex {POINTS}", file=file)
-            for name in ("x", "y", "z", "nx", "ny", "nz"):
-                print(f"property float {name}", file=file)
-            print("end_header", file=file)
-            for _ in range(POINTS):
-                (x, y, z), normal = seen(chance, sensors, offsets)
-                print(*(f"{v:.6f}" for v in (x + 0.02 * frame, y, z, *normal)), file=file)
+        points = (seen(chance, sensors, offsets) for _ in range(POINTS))
+        rows = ((x + 0.02 * frame, y, z, *normal) for (x, y, z), normal in points)
+        ascii_ply.write(f"{out}/points/{frame:04}.ply", POINTS, rows)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,8 @@ import os
 import random
 import sys
 
+import ascii_ply
+
 FRAMES, POINTS, RADIUS, SLOT, FLOOR = 6, 3000, 1.0, 0.3, 0.2
 
 
@@ -32,14 +34,9 @@ def main(out):
             shift = 0.05 * frame
             for y in (-6, 6):
                 print(frame, shift, y, 0.5, file=sensors)
-            with open(f"{out}/points/{frame:04}.ply", "w") as file:
-                print(f"ply\nformat ascii 1.0\nelement vertex {POINTS}", file=file)
-                for name in ("x", "y", "z", "nx", "ny", "nz"):
-                    print(f"property float {name}", file=file)
-                print("end_header", file=file)
-                for _ in range(POINTS):
-                    n = point(chance)
-                    print(*(f"{v:.6f}" for v in (n[0] + shift, n[1], n[2], *n)), file=file)
+            normals = (point(chance) for _ in range(POINTS))
+            rows = ((n[0] + shift, n[1], n[2], *n) for n in normals)
+            ascii_ply.write(f"{out}/points/{frame:04}.ply", POINTS, rows)
 
 
 if __name__ == "__main__":
