@@ -23,9 +23,9 @@
 #define RAY_BYTES   64  /* of a sample of the surface, to tell whether a sensor sees it */
 #define PRIOR_BYTES 512 /* of a node: how its edges are held, and by what is seen of it */
 
-/* While a reference that is one side of the body grows, points past its border are carried by the border's
- * motion, which is theirs while the body moves as one piece: then it is followed as far as it has places for
- * half of a frame's points, else as far as stage fuse says. */
+/* Points past the border of a side of the body are carried by the border's motion, which is theirs while the
+ * body moves as one piece: then it is followed as far as it has places for half of a frame's points, else as
+ * far as the brief says. */
 #define BENT 0.01 /* of its diagonal, what a rigid motion leaves; by trial, tests/bed/decisions.md */
 
 typedef struct state {
@@ -37,7 +37,7 @@ typedef struct state {
     npg_resume_points points; /* for states on disk */
     bool has_points;
     npg_group group;
-    int64_t unreached_count;      /* frames that a growing reference does not reach */
+    int64_t unreached_count;      /* frames that a side of the body is not followed to */
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
     struct figures {
@@ -231,8 +231,8 @@ static npg_status fit_pose(npg_worker *worker, npg_waiting *w, npg_side *at)
     return NPG_OK;
 }
 
-/* Whether the reference is a side of the body that this pass adds to. */
-static bool is_growing(const npg_worker *worker, size_t sensor_count)
+/* Whether the reference is a side of the body whose points are gathered. */
+static bool is_side(const npg_worker *worker, size_t sensor_count)
 {
     const state *s = npg_worker_state(worker);
     return npg_worker_pass(worker) == NPG_PASS_FUSE && sensor_count && npg_tracker_is_open(s->tracker);
@@ -250,7 +250,7 @@ static npg_status reaches(bool *is_reached, const npg_worker *worker, const npg_
     return NPG_OK;
 }
 
-/* A frame that a growing reference does not reach, nor those beyond it: a pose that is no number says so, in
+/* A frame that a side of the body is not followed to, nor those beyond it: a pose that is no number says so, in
  * the log, too. */
 static void leave_past(npg_waiting *w, npg_side *at)
 {
@@ -283,7 +283,7 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
     if (!is_key) npg_side_step_on(at, w->frame.index);
     NPG_TRY(fit_pose(worker, w, at));
     bool is_reached = true;
-    if (!is_key && is_growing(worker, w->cloud.sensor_count)) NPG_TRY(reaches(&is_reached, worker, w));
+    if (!is_key && is_side(worker, w->cloud.sensor_count)) NPG_TRY(reaches(&is_reached, worker, w));
     if (!is_reached) leave_past(w, at);
     at->index = w->frame.index;
     if (is_key) npg_side_copy(s->group.ways[1], at);
@@ -327,7 +327,7 @@ static npg_status finish_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    bool is_of_one_side = facts->brief.is_side || is_growing(worker, facts->sensor_count_max);
+    bool is_of_one_side = facts->brief.is_side || is_side(worker, facts->sensor_count_max);
     npg_recover_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group.count + NPG_GROUP_FIXED, sizeof *frames));
     size_t count = npg_group_list(&s->group, frames);

@@ -76,7 +76,7 @@ typedef struct npg_side {
     int64_t index;     /* of `now`       */
     npg_tracked now_tracked, before_tracked;
     bool has_now, has_before;
-    bool is_past; /* what a growing reference reaches */
+    bool is_past; /* where a side of the body is followed to */
     double now[]; /* K x 12; behind it those of the frame before, and `since` */
 } npg_side;
 

@@ -102,13 +102,13 @@ static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame
 }
 
 /* Of the points that the surface has a place for, where it grows; without any infinite. */
-static npg_status median_dist(double *median, const cloud *c, bool is_growing)
+static npg_status median_dist(double *median, const cloud *c, bool is_side)
 {
     size_t count = 0;
     float *dists;
     NPG_TRY(npg_alloc_array(&dists, NPG_FOR_MESH, c->count, sizeof *dists));
     for (size_t i = 0; i < c->count; i++)
-        if (!is_growing || !c->warped[i].is_beyond) dists[count++] = c->warped[i].dist;
+        if (!is_side || !c->warped[i].is_beyond) dists[count++] = c->warped[i].dist;
     qsort(dists, count, sizeof *dists, npg_order_float);
     *median = count ? (double)dists[count / 2] : HUGE_VAL;
     npg_release(&dists);
@@ -273,7 +273,7 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
     size_t most = npg_cells_count(s->cells);
     double least = fmax(NPG_CONFIRMED, FRAMES_SHARE * (double)s->frames);
     /* What is new may be seen by the last frame that is reached alone. */
-    bool is_one_enough = s->frames < 2 * NPG_CONFIRMED || npg_worker_facts(worker)->brief.is_growing;
+    bool is_one_enough = s->frames < 2 * NPG_CONFIRMED || npg_worker_facts(worker)->brief.leaves_open;
     int64_t frames_least = is_one_enough ? 1 : (int64_t)least;
     NPG_TRY(npg_alloc_array(&fused->points, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
     NPG_TRY(npg_alloc_array(&fused->normals, NPG_FOR_MESH, most + 1, 3 * sizeof(float)));
@@ -312,13 +312,13 @@ static npg_status collect_empty(const state *s, npg_fused *fused)
 static void report_gathered(npg_worker *worker, const npg_fused *fused)
 {
     const state *s = npg_worker_state(worker);
+    const npg_reference_loop *loop = npg_worker_kept(worker);
     json_t *report = npg_worker_report(worker);
     json_object_update_new(report, json_pack("{sI sI sI sI sI sI sf}", "frames", (json_int_t)s->frames,
                                              "frames_misaligned", (json_int_t)s->misaligned, "passes_grown",
-                                             (json_int_t)npg_worker_facts(worker)->brief.growing_passes,
-                                             "points", (json_int_t)s->points, "points_stray",
-                                             (json_int_t)s->strays, "points_fused", (json_int_t)fused->count,
-                                             "cell_unit", fused->spacing_unit));
+                                             (json_int_t)loop->grown, "points", (json_int_t)s->points,
+                                             "points_stray", (json_int_t)s->strays, "points_fused",
+                                             (json_int_t)fused->count, "cell_unit", fused->spacing_unit));
     if (fused->empty)
         json_object_set_new(report, "cells_seen_empty", json_integer((json_int_t)fused->empty_count));
     npg_worker_log(worker, NPG_LOG_INFO, -1,
@@ -444,7 +444,7 @@ static void tell(npg_worker *worker, const npg_reference_loop *loop, const npg_p
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "%lld frames see too much that the reference does not have yet%s",
                        (long long)result->unreached_count,
-                       brief->is_growing ? ": it grows, and they are followed again" : "");
+                       brief->leaves_open ? ": it grows, and they are followed again" : "");
 }
 
 static void offer(const npg_worker *worker, npg_reference_loop *loop)

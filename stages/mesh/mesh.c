@@ -329,15 +329,14 @@ static npg_status compare(bool *is_worse, making *m, const npg_candidate_clouds 
 }
 
 /* What all frames saw mostly makes the better reference; where points that took no part say otherwise, the
- * one before stays.  A side of the body that grows is no rival: it lacks what the next one has. */
+ * one before stays.  One that was open is no rival: it lacks what the next one has. */
 static npg_status take_back_if_worse(making *m)
 {
     const npg_facts *facts = npg_worker_facts(m->worker);
     const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
     npg_mesh *before = facts->reference;
     bool is_worse = false;
-    if (!m->fused || !before || !clouds || facts->brief.growing_passes || !facts->brief.takes_poses)
-        return NPG_OK;
+    if (!m->fused || !before || !clouds || facts->brief.was_open || !facts->brief.takes_poses) return NPG_OK;
     npg_status status = compare(&is_worse, m, clouds, before);
     if (status != NPG_DIVERGED) NPG_TRY(status);
     json_object_set_new(npg_worker_report(m->worker), "taken_back", json_boolean(is_worse));
@@ -354,9 +353,9 @@ static npg_status take_back_if_worse(making *m)
 static npg_status try_larger_cells(making *m)
 {
     const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
-    bool is_growing = npg_worker_facts(m->worker)->brief.is_growing, is_worse = true;
+    bool stays_open = npg_worker_facts(m->worker)->brief.leaves_open, is_worse = true;
     making fine = *m;
-    if (!m->fused || !clouds || !m->handles || m->state->depth || is_growing) return NPG_OK;
+    if (!m->fused || !clouds || !m->handles || m->state->depth || stays_open) return NPG_OK;
     json_t *report = npg_worker_report(m->worker), *of_fine = json_copy(report);
     m->mesh = NULL;
     m->state->is_larger_celled = true;

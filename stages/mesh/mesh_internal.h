@@ -44,8 +44,8 @@ typedef struct npg_point_set {
 } npg_point_set;
 
 /* The keyframe's points, an even choice of them where there are many; with `fused` (or NULL) those of all
- * frames, whose points and normals are taken from it.  While a side of the body grows into a whole
- * (facts.brief), those in empty space are dropped.
+ * frames, whose points and normals are taken from it.  Of a side of the body (facts.brief) those in empty
+ * space are dropped.
  * Figures go into the report of the worker's stage; called on its thread.  The set is to be closed; after a
  * failure it owns nothing.  NPG_MEMORY. */
 npg_status npg_point_set_open(npg_point_set *set, npg_worker *worker, const npg_frame *key, npg_fused *fused);
@@ -86,8 +86,7 @@ size_t npg_face_budget(const npg_reconstruct_settings *settings, const npg_point
 /* *mesh (unit coordinates, without normals, faces counter-clockwise from outside; owned by the caller, NULL
  * on failure) from the set, whose points and normals may be smoothed and turned in place.  *invented_share
  * gets the share of the area, 0..1, that no point saw and that was kept, as measured before decimation.
- * Of the facts it asks whether the reference grows (facts.brief): while it does, the mesh is
- * coarser and has nothing that was not seen.
+ * Where the brief leaves it open the mesh has nothing that was not seen.
  * Figures and warnings go to the report and the log of the worker's stage; called on its thread.  It uses all
  * cores, and the same input gives the same mesh.
  * NPG_BAD_INPUT: the set has no normals, or is one that npg_poisson() refuses.  NPG_FAILED: npg_poisson()

@@ -21,7 +21,7 @@ static npg_status take_frame(npg_point_set *set, npg_worker *worker, const npg_f
     return NPG_OK;
 }
 
-/* What has grown where most frames look through was carried there by a wrong motion. */
+/* What stands where most frames look through was carried there by a wrong motion. */
 static npg_status drop_empty(npg_point_set *set, npg_worker *worker)
 {
     uint8_t *keep;

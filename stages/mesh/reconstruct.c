@@ -13,7 +13,7 @@
 #define SMOOTH_NEIGHBOURS 24
 #define FUSED_NEIGHBOURS  60   /* of the points of all frames, which lie closer */
 #define UNSEEN_IS_A_SIDE  0.25 /* of the area: more than holes, a side that no camera saw */
-#define UNSEEN_IS_LEFT    0.05 /* the same of one that has grown: where the body goes on, out of sight */
+#define UNSEEN_IS_LEFT    0.05 /* the same of one that was open before: where the body goes on, out of sight */
 
 typedef struct reconstruction { /* what is known while the mesh is made */
     npg_worker *worker;
@@ -121,10 +121,10 @@ static npg_status judge_unseen(reconstruction *r)
     const npg_facts *facts = npg_worker_facts(r->worker);
     const npg_point_set *p = r->set;
     int way = r->settings->unseen;
-    double share, side = facts->brief.growing_passes ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
+    double share, side = facts->brief.was_open ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
     NPG_TRY(npg_mesh_unseen(&share, r->mesh, p->points, p->count, p->seen_dist));
     r->trims_unseen =
-        way == NPG_UNSEEN_TRIM || facts->brief.is_growing || (way != NPG_UNSEEN_KEEP && share > side);
+        way == NPG_UNSEEN_TRIM || facts->brief.leaves_open || (way != NPG_UNSEEN_KEEP && share > side);
     npg_mesh_note(r->worker, "unseen_share", share);
     json_object_set_new(npg_worker_report(r->worker), "unseen",
                         json_string(r->trims_unseen ? "trimmed" : "kept"));
@@ -138,13 +138,13 @@ static npg_status judge_unseen(reconstruction *r)
     return NPG_OK;
 }
 
-/* Of a side that has grown to a body shreds are left along the border.  One that still grows needs all it
- * has, and of one frame half a limb is as narrow. */
+/* Of sides put together shreds are left along the border.  What more is added to needs all it has, and of one
+ * frame half a limb is as narrow. */
 static npg_status drop_shreds(reconstruction *r)
 {
     const npg_facts *facts = npg_worker_facts(r->worker);
     double share;
-    if (!facts->brief.growing_passes || facts->brief.is_growing) return NPG_OK;
+    if (!facts->brief.was_open || facts->brief.leaves_open) return NPG_OK;
     NPG_TRY(npg_mesh_trim_shreds(&r->mesh, &share, r->set->seen_dist));
     npg_mesh_note(r->worker, "fringe_share", share);
     return NPG_OK;

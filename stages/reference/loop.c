@@ -26,12 +26,13 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
 static void grow(npg_reference_loop *loop, int64_t unreached)
 {
     npg_brief *brief = &loop->brief;
-    bool has_gained = !brief->growing_passes || unreached < loop->unreached_before;
+    bool has_gained = !loop->grown || unreached < loop->unreached_before;
     bool asks_less = !has_gained && brief->explained_least > NPG_MAJORITY + EXPLAINED_STEP / 2;
     if (asks_less) brief->explained_least = fmax(brief->explained_least - EXPLAINED_STEP, NPG_MAJORITY);
     loop->in_vain = has_gained || asks_less ? 0 : loop->in_vain + 1;
-    brief->is_growing = unreached && loop->in_vain < 2 && brief->growing_passes < GROW_PASSES;
-    brief->growing_passes += unreached > 0;
+    brief->leaves_open = unreached && loop->in_vain < 2 && loop->grown < GROW_PASSES;
+    loop->grown += unreached > 0;
+    brief->was_open = loop->grown > 0;
 }
 
 /* ---- which keyframe ---- */
@@ -94,7 +95,7 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
         loop->unreached_before ? !result->unreached_count : result->is_side && !brief->is_side;
     grow(loop, result->unreached_count);
     loop->unreached_before = result->unreached_count;
-    brief->rounds_left -= !brief->is_growing && !is_whole_now;
+    brief->rounds_left -= !brief->leaves_open && !is_whole_now;
     /* What was gathered last is followed by nothing yet that could contradict it. */
     brief->trims_only = brief->is_last_look;
     brief->is_last_look =

@@ -37,6 +37,7 @@ typedef struct npg_reference_loop {
     bool is_settled;                              /* the keyframe is no longer in question */
     bool is_compared;                             /* it was chosen among candidates ...    */
     npg_pass_result trial;                        /* ... after the pass that came to this  */
+    int64_t grown;                                /* passes that a side of the body has grown through   */
     int64_t unreached_before;                     /* of the pass before ...                             */
     int64_t in_vain;                              /* ... and passes in a row that reached no more since */
     bool is_limited;                              /* the pass to come is for what it explains alone     */

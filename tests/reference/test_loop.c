@@ -32,7 +32,7 @@ static void every_round_is_walked_once(void **state)
         int64_t walked = 0;
         npg_brief brief = npg_reference_begin(&loop, rounds);
         for (; brief.rounds_left; walked++) {
-            assert_false(brief.is_growing || brief.growing_passes);
+            assert_false(brief.leaves_open || brief.was_open);
             brief = next(&loop, 0, false);
             assert_true(brief.takes_gathered);
         }
@@ -75,16 +75,16 @@ static void a_side_grows_until_all_is_reached_and_is_gathered_once_more(void **s
     int64_t passes = 0;
     for (int64_t unreached = 60; unreached > 0; unreached -= 20, passes++) {
         brief = next_side(&loop, unreached);
-        assert_true(brief.is_growing && brief.takes_gathered);
+        assert_true(brief.leaves_open && brief.takes_gathered);
         assert_int_equal(brief.rounds_left, 1);
-        assert_int_equal(brief.growing_passes, passes + 1);
+        assert_int_equal(loop.grown, passes + 1);
     }
     brief = next_side(&loop, 0); /* whole now, and its newest part has nothing around it */
-    assert_false(brief.is_growing);
+    assert_false(brief.leaves_open);
     assert_int_equal(brief.rounds_left, 1);
     brief = next_side(&loop, 0);
     assert_int_equal(brief.rounds_left, 0);
-    assert_int_equal(brief.growing_passes, passes);
+    assert_int_equal(loop.grown, passes);
     assert_true(brief.takes_gathered);
 }
 
