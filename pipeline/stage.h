@@ -130,12 +130,6 @@ typedef struct npg_facts {
     int64_t wanted_number; /* pushed frames: those with smaller numbers need not come again; else INT64_MIN */
 } npg_facts;
 
-/* Whether the reference leaves an end of the capture unexplained, on either side of the keyframe. */
-static inline bool npg_facts_has_changed(const npg_facts *facts)
-{
-    return facts->has_changed[0] || facts->has_changed[1];
-}
-
 typedef struct npg_worker npg_worker;
 typedef struct npg_option npg_option; /* pipeline/options.h */
 typedef struct npg_store npg_store;   /* job/store.h */

@@ -509,7 +509,6 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
            (size_t)s->samples * RAY_BYTES;
 }
 
-extern const npg_stage npg_stage_align;
 const npg_stage npg_stage_align = {
     .name = "align",
     .help = "brings the reference coarsely into each frame",

@@ -8,6 +8,7 @@
 #include "evaluate/evaluate_internal.h"
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
+#include "geometry/sensor_space.h"
 #include "job/job.h"
 #include "pipeline/file.h"
 #include "pipeline/options.h"
@@ -413,7 +414,6 @@ static const npg_option options[] = {
     {0}};
 /* clang-format on */
 
-extern const npg_stage npg_stage_evaluate;
 const npg_stage npg_stage_evaluate = {.name = "evaluate",
                                       .help = "Measure every frame and judge it",
                                       .options = options,

@@ -541,7 +541,6 @@ static const npg_option options[] = {
     {0}};
 /* clang-format on */
 
-extern const npg_stage npg_stage_export;
 const npg_stage npg_stage_export = {.name = "export",
                                     .help = "Write meshes, report and checksums",
                                     .options = options,

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
-#include "pipeline/frame_box.h"
 #include "pipeline/parallel.h"
 
 #define PARTS_MOST     8

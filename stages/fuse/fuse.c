@@ -403,7 +403,7 @@ static npg_pass_result result_of(const npg_worker *worker)
     int64_t last = facts->planned_count - 1;
     npg_pass_result result = {.key = facts->plan.key,
                               .unreached_count = facts->unreached_count,
-                              .has_changed = npg_facts_has_changed(facts),
+                              .has_changed = facts->has_changed[0] || facts->has_changed[1],
                               .explained_from = facts->has_changed[1] ? facts->changed_at[1] + 1 : 0,
                               .explained_to = facts->has_changed[0] ? facts->changed_at[0] - 1 : last,
                               .is_side = s->grow_dist > 0,
@@ -524,7 +524,6 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
            npg_free_space_memory(facts->view_count_max);
 }
 
-extern const npg_stage npg_stage_fuse;
 const npg_stage npg_stage_fuse = {.name = "fuse",
                                   .help = "gathers the points of all frames for the reference",
                                   .options = options,

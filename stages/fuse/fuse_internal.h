@@ -3,6 +3,7 @@
 #define NPG_FUSE_INTERNAL_H
 
 #include "geometry/geometry.h"
+#include "geometry/sensor_space.h"
 
 /* Cells: averages of many points over small cubes, in memory that does not grow with the points.
  *

@@ -1,5 +1,6 @@
 /* Depth map: nearest distances by direction, and the outline of what was seen. */
 #include "geometry/geometry.h"
+#include "geometry/sensor_space.h"
 
 #include <math.h>
 #include <string.h>

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/sensor_space.h"
 #include "pipeline/memory.h"
 
 /* In cells: so far beside all that was seen is clearly outside of its outline, where a sensor mixes the body with

@@ -348,7 +348,6 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
            npg_worker_facts(worker)->point_count_max * 3 * sizeof(float);
 }
 
-extern const npg_stage npg_stage_ingest;
 const npg_stage npg_stage_ingest = {.name = "ingest",
                                     .help = "reads the frames",
                                     .options = ingest_options,

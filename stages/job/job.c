@@ -132,7 +132,6 @@ static npg_status begin(npg_worker *worker)
     return NPG_OK;
 }
 
-extern const npg_stage npg_stage_job;
 const npg_stage npg_stage_job = {.name = "job",
                                  .help = "resumes an earlier run of the same job",
                                  .options = options,

@@ -521,7 +521,6 @@ static double expects(const npg_worker *worker, npg_pass pass)
     return npg_cost_choice_s((double)facts->point_count_max, facts->has_normals);
 }
 
-extern const npg_stage npg_stage_keyframe;
 const npg_stage npg_stage_keyframe = {.name = "keyframe",
                                       .help = "Find the capture's box and choose the keyframe",
                                       .options = options,

@@ -3,8 +3,8 @@
 #define NPG_TRACK_H
 
 #include "geometry/geometry.h"
+#include "geometry/sensor_space.h"
 #include "pipeline/chunk.h"
-#include "pipeline/frame_box.h"
 #include "pipeline/memory.h"
 #include "pipeline/mesh.h"
 #include "pipeline/stage.h"

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "geometry/geometry.h"
+#include "geometry/sensor_space.h"
 #include "pipeline/memory.h"
 
 /* The sensor stands at -4 on an axis and looks along it; a ball of radius 0.5 around the origin, behind it a

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "geometry/geometry.h"
+#include "geometry/sensor_space.h"
 #include "pipeline/memory.h"
 
 /* The sensor is at (0, 0, -4) and looks along z; its cells are 0.01 of what is ahead wide.  A square of side 0.8

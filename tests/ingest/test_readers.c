@@ -445,68 +445,6 @@ static void no_points_is_no_failure(void **state)
     }
 }
 
-/* ---- meshes ---- */
-
-static void check_square(const npg_mesh *mesh)
-{
-    const float pos[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
-    const uint32_t faces[] = {0, 1, 2, 0, 2, 3};
-    const uint8_t colour[] = {255, 128, 0, 255};
-    assert_int_equal(mesh->vert_count, 4);
-    assert_int_equal(mesh->face_count, 2);
-    assert_memory_equal(mesh->vert_pos, pos, sizeof pos);
-    assert_memory_equal(mesh->faces, faces, sizeof faces);
-    for (size_t i = 0; i < 4; i++) {
-        assert_memory_equal(mesh->vert_colours + 4 * i, colour, 4);
-        assert_true(mesh->vert_normals[3 * i] == 0 && mesh->vert_normals[3 * i + 2] == 1);
-        assert_true(mesh->vert_uvs[2 * i] == pos[3 * i] && mesh->vert_uvs[2 * i + 1] == pos[3 * i + 1]);
-    }
-}
-
-static void read_square(const char *name, const void *data, size_t size)
-{
-    npg_mesh *mesh;
-    npg_origin origin = {0};
-    if (npg_read_mesh(&mesh, save(name, data, size), &origin)) fail_msg("%s", npg_error_text());
-    check_square(mesh);
-    npg_mesh_unref(&mesh);
-}
-
-static void meshes_with_all_they_carry(void **state)
-{
-    (void)state;
-    const char *obj =
-        "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 2\nv 0 0 0 1 .5 0\nv 1 0 0 1 .5 0\nv 1 1 0 1 .5 0\n"
-        "v 0 1 0 1 .5 0\nf 1/1/1 2/2/1 3/3/1 4/4/-1\n";
-    read_square("square.obj", obj, strlen(obj));
-    const char *head =
-        "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n"
-        "property uchar green\nproperty uchar blue\nproperty float nx\nproperty float ny\n"
-        "property float nz\nproperty float s\nproperty float t\nelement face 1\n"
-        "property int flags\nproperty list uchar uint vertex_index\nend_header\n";
-    char text[2048];
-    snprintf(text, sizeof text,
-             "ply\nformat ascii 1.0\n%s0 0 0 255 128 0 0 0 1 0 0\n1 0 0 255 128 0 0 0 1 1 0\n"
-             "1 1 0 255 128 0 0 0 1 1 1\n0 1 0 255 128 0 0 0 1 0 1\n-5 4 0 1 2 3\n",
-             head);
-    read_square("square.ply", text, strlen(text));
-    static bytes b;
-    b.size = 0;
-    put_text(&b, "ply\nformat binary_big_endian 1.0\n");
-    put_text(&b, head);
-    const float xy[][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-    for (size_t i = 0; i < 4; i++) {
-        const float before[] = {xy[i][0], xy[i][1], 0}, after[] = {0, 0, 1, xy[i][0], xy[i][1]};
-        for (size_t k = 0; k < 3; k++) put_float(&b, before[k], true);
-        put_bytes(&b, "\xff\x80\0", 3);
-        for (size_t k = 0; k < 5; k++) put_float(&b, after[k], true);
-    }
-    put_bits(&b, 0, 4, true);
-    put_bits(&b, 4, 1, true);
-    for (uint64_t k = 0; k < 4; k++) put_bits(&b, k, 4, true);
-    read_square("square.ply", b.data, b.size);
-}
-
 /* ---- streams ---- */
 
 /* A child writes the bytes a few at a time, as a pipe may deliver them. */
@@ -644,53 +582,6 @@ static void no_memory_at_any_point(void **state)
     }
 }
 
-/* ---- numbers ---- */
-
-static double next_number(uint64_t *seed)
-{
-    double value;
-    do {
-        *seed = *seed * 6364136223846793005u + 1442695040888963407u;
-        uint64_t bits = *seed ^ *seed >> 29;
-        memcpy(&value, &bits, sizeof value);
-    } while (!isfinite(value));
-    return value;
-}
-
-static void check_number(const char *text, double truth)
-{
-    double value = 0;
-    const char *end = text + strlen(text), *after = npg_number_parse(text, end, &value);
-    assert_ptr_equal(after, end);
-    double next = nextafter(truth, value);
-    assert_true(value == truth || value == next);
-}
-
-static void numbers_are_what_the_library_says(void **state)
-{
-    (void)state;
-    static const char *const formats[] = {"%.17g", "%.9g", "%.6f", "%.3e", "%+.15g", "%.25e", "%g"};
-    uint64_t seed = 7;
-    char text[512];
-    for (int i = 0; i < 20000; i++) {
-        double value = next_number(&seed);
-        if (i % 2) value = fmod(value, 1e7);
-        for (size_t f = 0; f < sizeof formats / sizeof *formats; f++) {
-            snprintf(text, sizeof text, formats[f], value);
-            check_number(text, strtod(text, NULL));
-        }
-    }
-    static const char *const good[] = {"0",   "-0",    ".5",     "5.",    "+1",
-                                       "1e5", "1E+05", "1e-320", "1e400", "00012"};
-    for (size_t i = 0; i < sizeof good / sizeof *good; i++) check_number(good[i], strtod(good[i], NULL));
-    static const char *const bad[] = {"",      "-",    ".",  "e5",  "1e",   "1e+",
-                                      "1.2.3", "0x10", "1f", "--1", "nano", "1_0"};
-    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-        double value;
-        assert_null(npg_number_parse(bad[i], bad[i] + strlen(bad[i]), &value));
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(ply_of_every_type_order_and_line_end),
@@ -704,11 +595,9 @@ int main(void)
                                        cmocka_unit_test(a_first_point_at_zero_costs_no_detail),
                                        cmocka_unit_test(points_that_are_not_finite_are_kept),
                                        cmocka_unit_test(no_points_is_no_failure),
-                                       cmocka_unit_test(meshes_with_all_they_carry),
                                        cmocka_unit_test(frames_from_a_pipe),
                                        cmocka_unit_test(a_stream_cut_anywhere),
                                        cmocka_unit_test(a_silent_stream_can_be_stopped),
-                                       cmocka_unit_test(no_memory_at_any_point),
-                                       cmocka_unit_test(numbers_are_what_the_library_says)};
+                                       cmocka_unit_test(no_memory_at_any_point)};
     return cmocka_run_group_tests(tests, open_reader_tests, close_reader_tests);
 }

@@ -2,7 +2,7 @@
 #ifndef TEST_IMAGE_SPACE_H
 #define TEST_IMAGE_SPACE_H
 
-#include "geometry/geometry.h"
+#include "geometry/sensor_space.h"
 
 #define IMAGE_STEP 0.01 /* of what is ahead: a cell */
 
