@@ -12,6 +12,9 @@
 
 #define BATCH_MIN 512 /* fewer queries are not worth a thread; set by trial */
 
+typedef float lanes __attribute__((vector_size(4 * sizeof(float))));
+typedef int32_t mask __attribute__((vector_size(4 * sizeof(float))));
+
 struct npg_surface {
     RTCDevice device;
     RTCScene scene;
@@ -19,6 +22,7 @@ struct npg_surface {
     size_t vert_count, face_count;
     float *vert_pos;        /* V x 3 and 16 bytes that Embree may read beyond them */
     uint32_t *faces;        /* F x 3 */
+    lanes (*boxes)[2];      /* F: lowest and highest corner of each; the last lane means nothing */
     atomic_ptrdiff_t bytes; /* what Embree holds, as it reports */
 };
 
@@ -61,13 +65,41 @@ static npg_status check_faces(const uint32_t *faces, size_t face_count, size_t v
     return NPG_OK;
 }
 
+/* Of each lane, without a branch: which it is nobody could foresee. */
+static inline lanes higher(lanes a, lanes b)
+{
+    mask is_a = a > b;
+    return (lanes)((is_a & (mask)a) | (~is_a & (mask)b));
+}
+
+/* A vertex and what lies behind it. */
+static inline lanes vertex(const npg_surface *surface, uint32_t v)
+{
+    lanes at;
+    memcpy(&at, surface->vert_pos + 3 * (size_t)v, sizeof at);
+    return at;
+}
+
+static void set_boxes(npg_surface *surface)
+{
+    for (size_t f = 0; f < surface->face_count; f++) {
+        const uint32_t *corners = surface->faces + 3 * f;
+        lanes a = vertex(surface, corners[0]), b = vertex(surface, corners[1]),
+              c = vertex(surface, corners[2]);
+        surface->boxes[f][0] = -higher(higher(-a, -b), -c);
+        surface->boxes[f][1] = higher(higher(a, b), c);
+    }
+}
+
 static npg_status copy_arrays(npg_surface *surface, const float *vertices, const uint32_t *faces)
 {
     size_t v = surface->vert_count, f = surface->face_count;
     NPG_TRY(npg_alloc_array(&surface->vert_pos, NPG_FOR_QUERY, 3 * v + 4, sizeof(float)));
     NPG_TRY(npg_alloc_array(&surface->faces, NPG_FOR_QUERY, f, 3 * sizeof(uint32_t)));
+    NPG_TRY(npg_alloc_array(&surface->boxes, NPG_FOR_QUERY, f, sizeof *surface->boxes));
     memcpy(surface->vert_pos, vertices, v * 3 * sizeof(float));
     memcpy(surface->faces, faces, f * 3 * sizeof(uint32_t));
+    set_boxes(surface);
     return NPG_OK;
 }
 
@@ -120,6 +152,7 @@ npg_status npg_surface_move(npg_surface *surface, const float *vertices)
     NPG_REQUIRE(surface && vertices);
     NPG_TRY(check_vertices(vertices, surface->vert_count));
     memcpy(surface->vert_pos, vertices, surface->vert_count * 3 * sizeof(float));
+    set_boxes(surface);
     rtcUpdateGeometryBuffer(surface->geometry, RTC_BUFFER_TYPE_VERTEX, 0);
     rtcCommitGeometry(surface->geometry);
     rtcCommitScene(surface->scene);
@@ -136,6 +169,7 @@ void npg_surface_close(npg_surface **slot)
     npg_memory_count(NPG_FOR_QUERY, -atomic_load(&surface->bytes));
     npg_release(&surface->vert_pos);
     npg_release(&surface->faces);
+    npg_release(&surface->boxes);
     npg_release(slot);
 }
 
@@ -170,6 +204,7 @@ static npg_status run_batch(batch b, int threads)
 typedef struct search {
     const npg_surface *surface;
     const float *point;
+    lanes at; /* the point */
     npg_surface_hit best;
 } search;
 
@@ -192,19 +227,10 @@ static float radius_of(const search *s)
  * distance takes many times as long. */
 static bool is_beyond(const search *s, uint32_t face)
 {
-    const uint32_t *corners = s->surface->faces + 3 * (size_t)face;
-    float dist_sq = 0;
-    for (size_t a = 0; a < 3; a++) {
-        float low = s->surface->vert_pos[3 * (size_t)corners[0] + a], high = low;
-        for (size_t k = 1; k < 3; k++) {
-            float x = s->surface->vert_pos[3 * (size_t)corners[k] + a];
-            low = x < low ? x : low;
-            high = x > high ? x : high;
-        }
-        float below = low - s->point[a], above = s->point[a] - high, gap = below > above ? below : above;
-        dist_sq += gap > 0 ? gap * gap : 0;
-    }
-    return dist_sq * 0.99999f > s->best.dist_sq;
+    const lanes *box = s->surface->boxes[face];
+    lanes gap = higher(higher(box[0] - s->at, s->at - box[1]), (lanes){0});
+    gap *= gap;
+    return (gap[0] + gap[1] + gap[2]) * 0.99999f > s->best.dist_sq;
 }
 
 /* Embree also calls for faces outside the radius: the exact distance decides. */
@@ -230,7 +256,8 @@ static void run_search(search *s, float radius)
 
 static void closest_of(const batch *b, size_t i)
 {
-    search s = {b->surface, b->points + 3 * i, {UINT32_MAX, {0, 0, 0}, INFINITY}};
+    const float *p = b->points + 3 * i;
+    search s = {b->surface, p, {p[0], p[1], p[2], 0}, {UINT32_MAX, {0, 0, 0}, INFINITY}};
     float radius = INFINITY;
     if (b->start_face && b->start_face[i] < b->surface->face_count && npg_vec3_is_finitef(s.point)) {
         try_face(&s, b->start_face[i]);

@@ -11,9 +11,18 @@
 #include "geometry/geometry.h"
 #include "pipeline/parallel.h"
 
-#define LANES 8           /* of a column */
-#define CELL  (6 * LANES) /* floats of a block */
-#define GRAIN 64          /* nodes whose rows are gathered, or multiplied, at a time */
+#define LANES       8           /* of a column */
+#define CELL        (6 * LANES) /* floats of a block */
+#define GRAIN       64          /* nodes whose rows are gathered, or multiplied, at a time */
+#define TERMS_AHEAD 4           /* what a term takes to come from memory, in terms */
+
+/* What terms say of a pair of nodes (a, b), or of a node with itself.  With m(arm) = (arm x normal, normal) the part
+ * across is a sum of outer products of six numbers.  That along, of K(arm) = (-[arm]x, I), is linear in the products
+ * of (arm, 1): sixteen sums are all of it. */
+typedef struct block {
+    double across[36];  /* sum across share_a share_b m(arm_a) m(arm_b)^T        */
+    double along[4][4]; /* sum along share_a share_b (arm_a, 1) (arm_b, 1)^T */
+} block;
 
 struct npg_block_system {
     npg_arena arena; /* of all arrays */
@@ -21,9 +30,10 @@ struct npg_block_system {
     uint32_t (*pairs)[2]; /* sorted                               */
     uint32_t *first;      /* n + 1: pairs[first[a]] .. have a = a */
     size_t term_most;
-    double *sum;          /* n x 36: blocks on the diagonal */
-    double *off;          /* pair_count x 36, block (a, b)  */
+    block *sum;           /* n: those on the diagonal       */
+    block *off;           /* pair_count                     */
     double *right;        /* n x 6                          */
+    uint32_t *pair_of;    /* of each grain, n: the number of the pair of the row at work with a node */
     uint32_t *term_first; /* n + 2: uses[term_first[a]] .. are node a's */
     uint32_t *uses;       /* NPG_BLOCK_NODES a term: its number times NPG_BLOCK_NODES + which of its nodes */
     const npg_block_term *terms; /* that are gathered; a loan */
@@ -37,6 +47,16 @@ struct npg_block_system {
     float *work;               /* 5 x n x LANES                                                     */
 };
 
+static size_t grains(const npg_block_system *s)
+{
+    return (s->n + GRAIN - 1) / GRAIN;
+}
+
+static size_t grain_end(const npg_block_system *s, size_t part)
+{
+    return (part + 1) * GRAIN < s->n ? (part + 1) * GRAIN : s->n;
+}
+
 void npg_block_close(npg_block_system **slot)
 {
     npg_object_close(slot);
@@ -46,11 +66,12 @@ static npg_status open_arrays(npg_block_system *s)
 {
     npg_arena *arena = &s->arena;
     size_t n = s->n, pairs = s->pair_count;
-    s->sum = npg_arena_take(arena, n, 36 * sizeof(double));
-    s->off = npg_arena_take(arena, pairs, 36 * sizeof(double));
+    s->sum = npg_arena_take(arena, n, sizeof *s->sum);
+    s->off = npg_arena_take(arena, pairs, sizeof *s->off);
+    s->pair_of = npg_arena_take(arena, grains(s) * n, sizeof *s->pair_of);
     s->right = npg_arena_take(arena, n, 6 * sizeof(double));
     s->term_first = npg_arena_take(arena, n + 2, sizeof *s->term_first);
-    s->uses = npg_arena_take(arena, s->term_most, NPG_BLOCK_NODES * sizeof *s->uses);
+    s->uses = npg_arena_take(arena, s->term_most + TERMS_AHEAD, NPG_BLOCK_NODES * sizeof *s->uses);
     s->pairs = npg_arena_take(arena, pairs, sizeof *s->pairs);
     s->first = npg_arena_take(arena, n + 2, sizeof *s->first);
     s->row_first = npg_arena_take(arena, n + 2, sizeof *s->row_first);
@@ -119,58 +140,47 @@ static void list_uses(npg_block_system *s, const npg_block_term *terms, size_t c
             s->uses[end[terms[t].nodes[k]]++] = (uint32_t)(t * NPG_BLOCK_NODES + k);
 }
 
-/* The number of the pair (a, b), a < b; pair_count when it is not in the set.  Of the dozen that have this a
- * all are counted: a branch that goes either way costs more. */
-INSIDE size_t pair_of(const npg_block_system *s, uint32_t a, uint32_t b)
-{
-    uint32_t at = s->first[a], end = s->first[a + 1];
-    for (uint32_t e = s->first[a]; e < end; e++) at += s->pairs[e][1] < b;
-    return at < end && s->pairs[at][1] == b ? at : s->pair_count;
-}
-
 typedef double four __attribute__((vector_size(4 * sizeof(double)), aligned(sizeof(double))));
 
-/* block += sum_c u_c v_c^T over `count` pairs; two of its rows are three vectors, and all nine stay in registers:
- * what was just stored by numbers would be slow to load as vectors. */
-INSIDE void add_outers(double *block, double (*u)[6], double (*v)[6], int count)
+/* m(arm), times what it counts. */
+INSIDE void set_lever(double lever[6], const npg_block_term *t, size_t k, double weight)
 {
-    four *to = (four *)block, rows[9];
-    for (int i = 0; i < 9; i++) rows[i] = to[i];
-    for (int c = 0; c < count; c++) {
-        const double *x = u[c], *y = v[c];
-        const four begin = {y[0], y[1], y[2], y[3]}, middle = {y[4], y[5], y[0], y[1]},
-                   end = {y[2], y[3], y[4], y[5]};
-        for (int i = 0; i < 3; i++) {
-            double p = x[2 * i], q = x[2 * i + 1];
-            rows[3 * i] += (four){p, p, p, p} * begin;
-            rows[3 * i + 1] += (four){p, p, q, q} * middle;
-            rows[3 * i + 2] += (four){q, q, q, q} * end;
-        }
+    npg_vec3_cross(lever, t->arms[k], t->normal);
+    for (int c = 0; c < 3; c++) {
+        lever[c] *= weight;
+        lever[3 + c] = weight * t->normal[c];
     }
-    for (int i = 0; i < 9; i++) to[i] = rows[i];
 }
 
-/* K^T of the three axes, K(arm) = (-[arm]x, I): a turn moves by turn x arm; and of the normal; each times what it
- * counts.  How many of them do count. */
-INSIDE int set_levers(double (*lever)[6], const npg_block_term *t, size_t k, double across, double along)
+/* += x y^T; two rows are three vectors. */
+INSIDE void add_across(double to[36], const double x[6], const double y[6])
 {
-    const double *a = t->arms[k], *n = t->normal;
-    const double all[4][6] = {{0, along * a[2], -along * a[1], along, 0, 0},
-                              {-along * a[2], 0, along * a[0], 0, along, 0},
-                              {along * a[1], -along * a[0], 0, 0, 0, along},
-                              {across * (a[1] * n[2] - a[2] * n[1]), across * (a[2] * n[0] - a[0] * n[2]),
-                               across * (a[0] * n[1] - a[1] * n[0]), across * n[0], across * n[1],
-                               across * n[2]}};
-    memcpy(lever, all, sizeof all);
-    return t->across != 0 ? 4 : 3;
+    four *rows = (four *)to;
+    const four begin = {y[0], y[1], y[2], y[3]}, middle = {y[4], y[5], y[0], y[1]},
+               end = {y[2], y[3], y[4], y[5]};
+    for (int i = 0; i < 3; i++) {
+        double p = x[2 * i], q = x[2 * i + 1];
+        rows[3 * i] += (four){p, p, p, p} * begin;
+        rows[3 * i + 1] += (four){p, p, q, q} * middle;
+        rows[3 * i + 2] += (four){q, q, q, q} * end;
+    }
+}
+
+/* += weight (x, 1) (y, 1)^T */
+INSIDE void add_along(double to[4][4], const double x[3], const double y[3], double weight)
+{
+    four *rows = (four *)to;
+    const four row = {weight * y[0], weight * y[1], weight * y[2], weight};
+    for (int i = 0; i < 3; i++) rows[i] += (four){x[i], x[i], x[i], x[i]} * row;
+    rows[3] += row;
 }
 
 /* What a term says of its node k: its right side, and its blocks with itself and nodes behind it; couplings of
  * pairs that are not in the set are left out. */
-INSIDE void add_use(npg_block_system *s, const npg_block_term *t, size_t k)
+INSIDE void add_use(npg_block_system *s, const npg_block_term *t, size_t k, const uint32_t *pair_of)
 {
     uint32_t a = t->nodes[k];
-    double lever[4][6], other[4][6], pull[3], turned[3], *right = s->right + 6 * (size_t)a;
+    double lever[6], other[6], pull[3], turned[3], *right = s->right + 6 * (size_t)a;
     double level = npg_vec3_dot(t->normal, t->right);
     for (int c = 0; c < 3; c++) pull[c] = t->across * level * t->normal[c] + t->along * t->right[c];
     npg_vec3_cross(turned, t->arms[k], pull);
@@ -178,41 +188,46 @@ INSIDE void add_use(npg_block_system *s, const npg_block_term *t, size_t k)
         right[c] += t->shares[k] * turned[c];
         right[3 + c] += t->shares[k] * pull[c];
     }
-    int count = set_levers(lever, t, k, t->across * t->shares[k], t->along * t->shares[k]);
+    set_lever(lever, t, k, t->across * t->shares[k]);
     for (size_t b = 0; b < t->count; b++) {
-        if (t->nodes[b] < a) continue;
-        size_t pair = b == k ? 0 : pair_of(s, a, t->nodes[b]);
-        if (pair == s->pair_count && b != k) continue;
-        set_levers(other, t, b, t->shares[b], t->shares[b]);
-        add_outers(b == k ? s->sum + 36 * (size_t)a : s->off + 36 * pair, lever, other, count);
+        uint32_t node = t->nodes[b], pair = pair_of[node];
+        if (node < a) continue;
+        bool is_known = pair >= s->first[a] && pair < s->first[a + 1] && s->pairs[pair][1] == node;
+        if (b != k && !is_known) continue;
+        block *to = b == k ? s->sum + a : s->off + pair;
+        add_along(to->along, t->arms[k], t->arms[b], t->along * t->shares[k] * t->shares[b]);
+        if (t->across == 0) continue;
+        set_lever(other, t, b, t->shares[b]);
+        add_across(to->across, lever, other);
     }
 }
 
-/* Rows [first, last). */
-NPG_WIDE static void gather_rows(npg_block_system *s, size_t first, size_t last)
+/* A node's terms lie anywhere among the others. */
+INSIDE void fetch(const npg_block_term *t)
+{
+    for (size_t i = 0; i < sizeof *t; i += 64) __builtin_prefetch((const char *)t + i);
+}
+
+/* Rows [first, last); pair_of: n, scratch. */
+NPG_WIDE static void gather_rows(npg_block_system *s, size_t first, size_t last, uint32_t *pair_of)
 {
     size_t pairs = s->first[last] - s->first[first];
-    memset(s->sum + 36 * first, 0, (last - first) * 36 * sizeof(double));
-    memset(s->off + 36 * (size_t)s->first[first], 0, pairs * 36 * sizeof(double));
+    memset(s->sum + first, 0, (last - first) * sizeof *s->sum);
+    memset(s->off + s->first[first], 0, pairs * sizeof *s->off);
     memset(s->right + 6 * first, 0, (last - first) * 6 * sizeof(double));
-    for (uint32_t u = s->term_first[first]; u < s->term_first[last]; u++)
-        add_use(s, &s->terms[s->uses[u] / NPG_BLOCK_NODES], s->uses[u] % NPG_BLOCK_NODES);
-}
-
-static size_t grains(const npg_block_system *s)
-{
-    return (s->n + GRAIN - 1) / GRAIN;
-}
-
-static size_t grain_end(const npg_block_system *s, size_t part)
-{
-    return (part + 1) * GRAIN < s->n ? (part + 1) * GRAIN : s->n;
+    for (size_t a = first; a < last; a++) {
+        for (uint32_t e = s->first[a]; e < s->first[a + 1]; e++) pair_of[s->pairs[e][1]] = e;
+        for (uint32_t u = s->term_first[a]; u < s->term_first[a + 1]; u++) {
+            fetch(&s->terms[s->uses[u + TERMS_AHEAD] / NPG_BLOCK_NODES]);
+            add_use(s, &s->terms[s->uses[u] / NPG_BLOCK_NODES], s->uses[u] % NPG_BLOCK_NODES, pair_of);
+        }
+    }
 }
 
 static npg_status gather_part(void *user, size_t part)
 {
     npg_block_system *s = user;
-    gather_rows(s, part * GRAIN, grain_end(s, part));
+    gather_rows(s, part * GRAIN, grain_end(s, part), s->pair_of + part * s->n);
     return NPG_OK;
 }
 
@@ -226,10 +241,28 @@ npg_status npg_block_gather(npg_block_system *s, const npg_block_term *terms, si
 
 /* ---- solving ---- */
 
-static void set_cell(float *cell, const double *block, bool transposed)
+/* K^T K' of the part along: with M = sum a b^T it is (tr M) I - M^T, [sum a]x; -[sum b]x, sum 1. */
+static void set_whole(double whole[36], const block *b)
+{
+    const double(*m)[4] = b->along;
+    const double trace = m[0][0] + m[1][1] + m[2][2];
+    memcpy(whole, b->across, sizeof b->across);
+    for (size_t i = 0; i < 3; i++) {
+        size_t j = (i + 1) % 3, k = (i + 2) % 3;
+        for (size_t c = 0; c < 3; c++) whole[6 * i + c] -= m[c][i];
+        whole[7 * i] += trace;
+        whole[7 * i + 21] += m[3][3];
+        whole[6 * i + 3 + j] -= m[k][3];
+        whole[6 * i + 3 + k] += m[j][3];
+        whole[18 + 6 * i + j] += m[3][k];
+        whole[18 + 6 * i + k] -= m[3][j];
+    }
+}
+
+static void set_cell(float *cell, const double *whole, bool transposed)
 {
     for (int j = 0; j < 6; j++)
-        for (int i = 0; i < 6; i++) cell[LANES * j + i] = (float)block[transposed ? 6 * j + i : 6 * i + j];
+        for (int i = 0; i < 6; i++) cell[LANES * j + i] = (float)whole[transposed ? 6 * j + i : 6 * i + j];
 }
 
 static void invert(double *inverse, const double *a)
@@ -247,18 +280,19 @@ static void invert(double *inverse, const double *a)
 static npg_status lay_out_part(void *user, size_t part)
 {
     const npg_block_system *s = user;
-    double sum[36], inverse[36];
+    double whole[36], inverse[36];
     size_t first = part * GRAIN, last = grain_end(s, part);
     for (size_t k = first; k < last; k++) {
-        memcpy(sum, s->sum + 36 * k, sizeof sum);
-        for (int i = 0; i < 6; i++) sum[7 * i] += s->damping;
-        invert(inverse, sum);
-        set_cell(s->diagonal + CELL * k, sum, false);
+        set_whole(whole, s->sum + k);
+        for (int i = 0; i < 6; i++) whole[7 * i] += s->damping;
+        invert(inverse, whole);
+        set_cell(s->diagonal + CELL * k, whole, false);
         set_cell(s->inverse + CELL * k, inverse, false);
     }
     for (size_t e = s->first[first]; e < s->first[last]; e++) {
-        set_cell(s->cells + CELL * (size_t)s->place[2 * e], s->off + 36 * e, false);
-        set_cell(s->cells + CELL * (size_t)s->place[2 * e + 1], s->off + 36 * e, true);
+        set_whole(whole, s->off + e);
+        set_cell(s->cells + CELL * (size_t)s->place[2 * e], whole, false);
+        set_cell(s->cells + CELL * (size_t)s->place[2 * e + 1], whole, true);
     }
     return NPG_OK;
 }
