@@ -78,9 +78,8 @@ typedef struct npg_brief {
     bool is_last_look; /* the pass is walked for what frames contradict of what was gathered last, no more */
     bool trims_only;   /* the next reference is the one so far, without what the frames followed contradict */
     bool is_side;      /* the reference is a side of the body, of which sensors see a part in a frame */
-    bool
-        leaves_open; /* the next reference is not closed over what no frame saw; what one frame saw is enough */
-    bool was_open;   /* such a one was made before */
+    bool leaves_open;  /* the next reference has what one frame saw, and is not closed over what none did */
+    bool was_open;     /* such a one was made before */
     double explained_least; /* share of a frame's points that a side that bends must have places for: it is
                                followed to the last frame before one of which it has fewer                 */
 } npg_brief;

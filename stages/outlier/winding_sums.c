@@ -6,8 +6,8 @@
 #include "geometry/limits.h"
 #include "pipeline/parallel.h"
 
-#define GROUP_MAX    64 /* places of one group */
-#define MOMENT_TERMS 9
+#define GROUP_MAX    64 /* places of a group: about the root of their number, so that near and far cost alike */
+#define MOMENT_TERMS 9 /* of Q, 3 x 3 */
 
 /* Sources of a sum: points, or groups of them, whose moments are q[3 r + c] = sum m_r (p - middle)_c. */
 typedef struct sources {
