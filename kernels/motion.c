@@ -80,12 +80,15 @@ static npg_status open_programs(npg_motion *m, npg_device *device)
     return npg_program_open(&m->isometry, device, "isometry", "");
 }
 
-static npg_status upload_rest(npg_motion *m, npg_device *device, const float *vertices)
+/* Of `copies` frames, one behind the other. */
+static npg_status upload_rest(npg_motion *m, npg_device *device, const float *vertices, size_t copies)
 {
     float *packed;
-    NPG_TRY(npg_alloc_array(&packed, NPG_FOR_FIT, m->rows * 3, sizeof(float)));
-    pack16(packed, vertices, m->real, m->rows);
-    npg_status status = npg_buffer_from(&m->rest, device, packed, m->rows * 3 * sizeof(float));
+    size_t row = 3 * m->rows;
+    NPG_TRY(npg_alloc_array(&packed, NPG_FOR_FIT, copies * row, sizeof(float)));
+    for (size_t t = 0; t < copies; t++)
+        pack16(packed + t * row, vertices + t * 3 * m->real, m->real, m->rows);
+    npg_status status = npg_buffer_from(&m->rest, device, packed, copies * row * sizeof(float));
     npg_release(&packed);
     return status;
 }
@@ -230,7 +233,7 @@ npg_status npg_motion_open(npg_motion *m, npg_device *device, const float *verti
                       .local = (size_t)npg_device_tuning(device)->frame_local,
                       .queries = (size_t)npg_device_tuning(device)->nearest_queries};
     npg_status status = open_programs(m, device);
-    if (!status) status = upload_rest(m, device, vertices);
+    if (!status) status = upload_rest(m, device, vertices, 1);
     if (!status) status = upload_edges(m, device, vertices, edges, edge_count);
     if (!status && targets) status = upload_targets(m, device, targets);
     if (!status) status = open_moving(m, device);
@@ -248,12 +251,20 @@ void npg_motion_close(npg_motion *m)
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) npg_buffer_close(all[i]);
 }
 
+npg_status npg_motion_rebase(npg_motion *m, npg_device *device, const float *bases)
+{
+    npg_buffer_close(&m->rest);
+    m->stride = 3 * m->rows;
+    return upload_rest(m, device, bases, m->frames);
+}
+
 /* ---- steps ---- */
 
 npg_status npg_motion_apply(npg_motion *m, const npg_buffer *out, size_t first, size_t count)
 {
     return NPG_LAUNCH(m->transform, "transform_apply", m->rows, count, NPG_BUF(&m->x), NPG_BUF(out),
-                      NPG_BUF(&m->rest), NPG_INT(m->rows), NPG_INT(first), NPG_INT(count));
+                      NPG_BUF(&m->rest), NPG_INT(m->stride), NPG_INT(m->rows), NPG_INT(first),
+                      NPG_INT(count));
 }
 
 npg_status npg_motion_chamfer(npg_motion *m, double alpha, size_t first, size_t count)
@@ -281,6 +292,6 @@ npg_status npg_motion_back(npg_motion *m, const npg_buffer *dout, const npg_buff
                        NPG_BUF(&m->edge_rest), NPG_BUF(&m->gain), NPG_REAL(iso_gain), NPG_INT(m->rows),
                        NPG_INT(first), NPG_INT(count)));
     return NPG_LAUNCH(m->transform, "transform_back", m->rows, count, NPG_BUF(dout), NPG_BUF(&m->g),
-                      NPG_BUF(out), NPG_BUF(&m->rest), NPG_INT(m->rows), NPG_INT(first), NPG_INT(count),
-                      NPG_INT(m->real));
+                      NPG_BUF(out), NPG_BUF(&m->rest), NPG_INT(m->stride), NPG_INT(m->rows), NPG_INT(first),
+                      NPG_INT(count), NPG_INT(m->real));
 }

@@ -9,7 +9,8 @@
 typedef struct npg_motion {
     npg_program *transform, *nearest, *chamfer, *isometry;
     size_t rows, real, frames;              /* V padded, V, T                                           */
-    npg_buffer rest;                        /* positions that are transformed */
+    npg_buffer rest;                        /* positions that are transformed: of all frames, or of each   */
+    size_t stride;                          /* floats from one frame's to the next; 0: all have the same   */
     npg_buffer x, g;                        /* [frames] positions and dL/dx                             */
     npg_buffer vert_boxes;                  /* [frames][tree blocks of V][96]                           */
     npg_buffer points, point_boxes;         /* all targets, and their trees                             */
@@ -33,6 +34,10 @@ npg_status npg_motion_open(npg_motion *motion, npg_device *device, const float *
                            size_t rows, const uint32_t (*edges)[2], size_t edge_count,
                            const npg_target *targets, size_t frames);
 void npg_motion_close(npg_motion *motion);
+
+/* From now on each frame's own positions are transformed: bases [frames][real x 3], ordered as the vertices that
+ * the motion was opened with, whose edges stay what edges are compared with. */
+npg_status npg_motion_rebase(npg_motion *motion, npg_device *device, const float *bases);
 
 /* x of frames first .. first + count - 1 from the decoder's out [frames][rows][8]. */
 npg_status npg_motion_apply(npg_motion *motion, const npg_buffer *out, size_t first, size_t count);

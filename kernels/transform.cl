@@ -1,4 +1,6 @@
 /* transform: x = R(q) v + tanh(0.1 d) for every vertex of every frame (paper: "Transformation Mapping").
+ * v: its place in the reference, or in a base of the frame's own, as far apart in `rest` as `stride` says (0: all
+ * frames have the same).
  *
  * out: [frames][rows][8] = four rotation values, three of translation, one unused.  Positions are in blocks (layout.h),
  * frame after frame.  All kernels of the step work on the frames first .. first + count - 1.
@@ -21,14 +23,15 @@ inline turn turn_of(float8 o)
 }
 
 /* x: [frames] x positions; rest: the positions to transform.  Global size: (rows, count). */
-kernel void transform_apply(global float *x, global const float *out, global const float *rest, int rows,
-                            int first, int count)
+kernel void transform_apply(global float *x, global const float *out, global const float *rest, int stride,
+                            int rows, int first, int count)
 {
     size_t i = get_global_id(0), frame = first + get_global_id(1);
     if (i >= (size_t)rows || frame >= (size_t)(first + count)) return;
     size_t at = NPG_POINT_AT(i);
     float8 o = vload8(frame * rows + i, out);
     turn q = turn_of(o);
+    rest += frame * stride;
     float3 v = POINT(rest, at);
     float3 uv = cross(q.u, v);
     float3 y = v + 2.0f * (q.s * uv + cross(q.u, uv)) + tanh(REACH * o.s456);
@@ -40,12 +43,14 @@ kernel void transform_apply(global float *x, global const float *out, global con
 
 /* dout from g = dL/dx; rows from `real` on are padding and get 0.  Global size: (rows, count). */
 kernel void transform_back(global float *dout, global const float *g, global const float *out,
-                           global const float *rest, int rows, int first, int count, int real)
+                           global const float *rest, int stride, int rows, int first, int count,
+                           int real)
 {
     size_t i = get_global_id(0), frame = first + get_global_id(1);
     if (i >= (size_t)rows || frame >= (size_t)(first + count)) return;
     size_t at = NPG_POINT_AT(i);
     global const float *from = g + frame * rows * 3;
+    rest += frame * stride;
     float8 o = vload8(frame * rows + i, out), d = 0.0f;
     if (i < (size_t)real) {
         turn q = turn_of(o);

@@ -129,6 +129,16 @@ static npg_status refuse_unused(npg_worker *worker, const npg_solver *row)
     return NPG_OK;
 }
 
+/* Without poses a window starts from frames that the one before it has solved. */
+static npg_status check_overlap(npg_worker *worker, const npg_solver *row)
+{
+    const npg_options *options_given = npg_worker_options(worker);
+    bool is_whole = !strcmp(npg_options_get(options_given, "window"), "0");
+    if (row->needs_poses || is_whole || strcmp(npg_options_get(options_given, "overlap"), "0") != 0)
+        return NPG_OK;
+    return npg_error(NPG_USAGE, "option overlap: 0: windows of the paper's method share one frame at least");
+}
+
 static npg_status resume(npg_worker *worker);
 
 static bool is_resumed(const npg_worker *worker)
@@ -158,6 +168,7 @@ static npg_status init(npg_worker *worker)
     s->row = npg_solver_of(worker);
     NPG_TRY(check_widths(&s->settings.grid));
     NPG_TRY(refuse_unused(worker, s->row));
+    NPG_TRY(check_overlap(worker, s->row));
     if (s->row->needs_device) NPG_TRY(open_device(worker));
     return is_resumed(worker) ? resume(worker) : NPG_OK;
 }
@@ -230,7 +241,7 @@ static npg_status watch(void *user, const npg_solver_step *step)
     if (step->step % 25 == 0 || step->step + 1 == step->steps)
         npg_worker_log(worker, NPG_LOG_DEBUG, -1, "window %lld step %lld: loss %.4g",
                        (long long)s->hand.window_at, (long long)step->step, step->loss);
-    if (npg_window_keeps_inside(s->solver)) NPG_TRY(keep_inside(worker));
+    if (s->row->keeps_inside) NPG_TRY(keep_inside(worker));
     return npg_worker_stopping(worker) ? NPG_STOPPED : NPG_OK;
 }
 

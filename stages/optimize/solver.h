@@ -98,8 +98,7 @@ typedef struct npg_solver {
     /* What goes from window to window, or how far the window at work is; NULL where nothing does. */
     npg_status (*save)(void *solver, npg_store *store, const npg_solver_moment *moment);
     npg_status (*restore)(void *solver, const npg_record *record);
-    /* Whether the window at work could be gone on from after this step; NULL: never, windows are short. */
-    bool (*keeps_inside)(const void *solver);
+    bool keeps_inside; /* the window at work can be gone on from after any step: windows are long */
     void (*close)(void **solver);
 } npg_solver;
 

@@ -220,11 +220,6 @@ npg_status npg_window_save(npg_window_solver *s, npg_store *store, const npg_sol
     return s->row->save ? s->row->save(s->solver, store, moment) : NPG_OK;
 }
 
-bool npg_window_keeps_inside(const npg_window_solver *s)
-{
-    return s->row->keeps_inside && s->row->keeps_inside(s->solver);
-}
-
 npg_status npg_window_restore(npg_window_solver *s, const npg_record *record)
 {
     double noise;

@@ -47,7 +47,6 @@ npg_status npg_window_solve(npg_window_solver *solver, npg_window_result *result
 
 /* What goes to the next window, or how far this one is, to a state and back. */
 npg_status npg_window_save(npg_window_solver *solver, npg_store *store, const npg_solver_moment *moment);
-bool npg_window_keeps_inside(const npg_window_solver *solver);
 npg_status npg_window_restore(npg_window_solver *solver, const npg_record *record);
 
 /* Checkpoint: what stage optimize adds to the state of a run after a solved window, and takes back (job/job.h). */

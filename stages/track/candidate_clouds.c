@@ -113,63 +113,30 @@ size_t npg_candidate_clouds_find(const npg_candidate_clouds *clouds, int64_t ind
 
 /* ---- following ---- */
 
-typedef struct follower {
-    const npg_candidate_clouds *clouds;
-    npg_tracker *tracker;
-    size_t node_count;
-    double *pose, *before, *next; /* K x 12 each */
-    float *vert_unit;             /* V x 3       */
-    bool with_normals;
-    npg_candidate_seen seen;
-    void *user;
-} follower;
-
-static npg_status open_follower(follower *f, npg_arena *scratch, npg_mesh *mesh,
-                                const npg_tracker_settings *settings)
-{
-    NPG_TRY(npg_tracker_open(&f->tracker, mesh, settings));
-    f->node_count = npg_tracker_node_count(f->tracker);
-    size_t bytes = npg_pose_bytes(f->node_count);
-    f->pose = npg_arena_take(scratch, 1, bytes);
-    f->before = npg_arena_take(scratch, 1, bytes);
-    f->next = npg_arena_take(scratch, 1, bytes);
-    f->vert_unit = npg_arena_take(scratch, mesh->vert_count, 3 * sizeof(float));
-    return npg_arena_status(scratch);
-}
-
-static npg_status follow_to(follower *f, const npg_candidate_cloud *next)
-{
-    npg_tracked tracked;
-    npg_pose_extrapolate(f->next, f->pose, f->before, f->node_count);
-    double *oldest = f->before;
-    f->before = f->pose;
-    f->pose = f->next;
-    f->next = oldest;
-    const npg_tracker_cloud cloud = {.points = next->fit,
-                                     .normals = f->with_normals ? next->fit_normals : NULL,
-                                     .count = next->fit_count,
-                                     .sensors = next->sensors,
-                                     .sensor_count = next->sensor_count,
-                                     .space = next->space};
-    NPG_TRY(npg_tracker_fit(f->tracker, &tracked, f->pose, &cloud, NULL, NULL));
-    npg_tracker_vertices(f->tracker, f->vert_unit, f->pose);
-    return f->seen(f->user, next, f->vert_unit);
-}
-
 npg_status npg_candidate_follow(const npg_candidate_clouds *clouds, size_t from, npg_mesh *mesh,
                                 const npg_tracker_settings *settings, npg_candidate_seen seen, void *user)
 {
-    npg_arena scratch = {.purpose = NPG_FOR_FIT};
-    follower f = {.clouds = clouds, .seen = seen, .user = user};
-    f.with_normals = clouds->given && (double)clouds->flipped <= FLIPPED_MOST * (double)clouds->given;
-    npg_status status = open_follower(&f, &scratch, mesh, settings);
+    npg_follower follower;
+    float *vert_unit = NULL;
+    bool with_normals = clouds->given && (double)clouds->flipped <= FLIPPED_MOST * (double)clouds->given;
+    npg_status status = npg_follower_open(&follower, mesh, settings);
+    if (!status) status = npg_alloc_array(&vert_unit, NPG_FOR_FIT, mesh->vert_count, 3 * sizeof *vert_unit);
     for (int step = -1; step <= 1 && !status; step += 2) {
-        npg_pose_rest(f.pose, f.node_count);
-        npg_pose_rest(f.before, f.node_count);
-        for (size_t i = from + (size_t)step; i < clouds->count && !status; i += (size_t)step)
-            status = follow_to(&f, &clouds->list[i]);
+        npg_follower_rest(&follower);
+        for (size_t i = from + (size_t)step; i < clouds->count && !status; i += (size_t)step) {
+            const npg_candidate_cloud *next = &clouds->list[i];
+            const npg_tracker_cloud cloud = {.points = next->fit,
+                                             .normals = with_normals ? next->fit_normals : NULL,
+                                             .count = next->fit_count,
+                                             .sensors = next->sensors,
+                                             .sensor_count = next->sensor_count,
+                                             .space = next->space};
+            status = npg_follower_go(&follower, &cloud);
+            if (!status) npg_follower_vertices(&follower, vert_unit);
+            if (!status) status = seen(user, next, vert_unit);
+        }
     }
-    npg_tracker_close(&f.tracker);
-    npg_arena_release(&scratch);
+    npg_release(&vert_unit);
+    npg_follower_close(&follower);
     return status;
 }

@@ -269,6 +269,26 @@ void npg_tracker_since(const npg_tracker *tracker, float *since, const float *be
 /* vert_unit (V x 3) of the reference in a pose. */
 void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose);
 
+/* Follower: a surface from frame to frame, in each from where the one before it was going. */
+typedef struct npg_follower {
+    npg_tracker *tracker;
+    double *pose, *before, *next; /* K x 12 each; pose: of the frame that it is in */
+    npg_arena arena;
+} npg_follower;
+
+/* mesh: as of npg_tracker_open().  At rest.  NPG_MEMORY: what was got is to be closed. */
+npg_status npg_follower_open(npg_follower *follower, npg_mesh *mesh, const npg_tracker_settings *settings);
+void npg_follower_close(npg_follower *follower);
+
+/* Back to where the mesh is. */
+void npg_follower_rest(npg_follower *follower);
+
+/* To the next frame, of one point at least. */
+npg_status npg_follower_go(npg_follower *follower, const npg_tracker_cloud *cloud);
+
+/* vert_unit (V x 3) of the mesh there. */
+void npg_follower_vertices(const npg_follower *follower, float *vert_unit);
+
 /* Rigid ICP: how a body stands in one frame against another, as far as it moved as a whole.
  *
  * Motion recurs, but seldom in place: who walks comes back to a pose lengths away, who turns comes back to it

@@ -128,6 +128,42 @@ static void tied_frames_follow_their_tie(void **state)
     npg_fit_close(&fit);
 }
 
+/* What a field at rest has each frame at is its base, and what it learns comes on top. */
+static void frames_start_at_their_bases(void **state)
+{
+    const npg_fit_settings settings = {
+        .grid = small_grid, .paper = {NPG_CONFIDENCE_CONSTANT, 5, 0.3}, .rate_end = 0.1, .feature_start = 3};
+    npg_fit_frame frames[FRAMES];
+    float bases[FRAMES][3 * VERTS], points[FRAMES][3 * VERTS], end[3 * VERTS];
+    double before = 0, after = 0;
+    npg_fit *fit;
+    (void)state;
+    for (int t = 0; t < FRAMES; t++) {
+        pose_ball(bases[t], ball->vert_pos, VERTS, 3 - t); /* outward is another order than the caller's */
+        pose_ball(points[t], ball->vert_pos, VERTS, 3.5 - t);
+        frames[t] = (npg_fit_frame){3 - t, 0.3 * t, points[t], VERTS, NULL, bases[t]};
+    }
+    assert_int_equal(npg_fit_open(&fit, device, &settings, ball, 3), 0);
+    npg_fit_rest(fit);
+    assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0, NULL, NULL), 0);
+    assert_int_equal(npg_fit_run(fit, 0, 0, NULL, NULL), 0);
+    for (size_t t = 0; t < FRAMES; t++) {
+        assert_int_equal(npg_fit_vertices(fit, end, t), 0);
+        for (int i = 0; i < 3 * VERTS; i++) {
+            assert_true(fabsf(end[i] - bases[t][i]) < 1e-6f);
+            before += pow((double)(end[i] - points[t][i]), 2);
+        }
+    }
+    assert_int_equal(npg_fit_run(fit, 0, 200, NULL, NULL), 0);
+    for (size_t t = 0; t < FRAMES; t++) {
+        assert_int_equal(npg_fit_vertices(fit, end, t), 0);
+        for (int i = 0; i < 3 * VERTS; i++) after += pow((double)(end[i] - points[t][i]), 2);
+    }
+    print_message("from the points: %.4g at the bases, then %.4g\n", sqrt(before), sqrt(after));
+    assert_true(after < 0.1 * before);
+    npg_fit_close(&fit);
+}
+
 /* ---- windows ---- */
 
 static void the_warm_start_is_exact_on_the_overlap(void **state)
@@ -140,7 +176,7 @@ static void the_warm_start_is_exact_on_the_overlap(void **state)
     (void)state;
     for (int i = 0; i < FRAMES; i++) {
         pose_ball(points[i], ball->vert_pos, VERTS, i);
-        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL};
+        frames[i] = (npg_fit_frame){i, (double)i / (FRAMES - 1), points[i], VERTS, NULL, NULL};
     }
     assert_int_equal(npg_fit_open(&fit, device, &small, ball, 3), 0);
     assert_int_equal(npg_fit_begin(fit, frames, FRAMES, 0, NULL, NULL), 0);
@@ -280,6 +316,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ways_follow_a_loss_of_the_callers),
         cmocka_unit_test(tied_frames_follow_their_tie),
+        cmocka_unit_test(frames_start_at_their_bases),
         cmocka_unit_test(the_warm_start_is_exact_on_the_overlap),
         cmocka_unit_test(a_window_has_its_share_of_solved_frames),
         cmocka_unit_test(where_the_surface_is_does_not_matter),

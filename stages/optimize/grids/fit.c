@@ -280,14 +280,31 @@ static npg_status open_motion_on(npg_fit *fit, const npg_target *targets)
                            (const uint32_t(*)[2])fit->edges, fit->edge_count, targets, fit->frame_count);
 }
 
+/* V x 3 in the order of rows. */
+static void copy_rows(float *to, const npg_fit *fit, const float *from)
+{
+    for (size_t i = 0; i < fit->real; i++)
+        memcpy(to + 3 * i, from + 3 * (size_t)fit->order[i], 3 * sizeof *to);
+}
+
+static npg_status take_bases(npg_fit *fit, const npg_fit_frame *frames)
+{
+    float *bases;
+    if (!frames->base) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&bases, NPG_FOR_FIT, fit->frame_count * fit->real, 3 * sizeof *bases));
+    for (size_t k = 0; k < fit->frame_count; k++)
+        copy_rows(bases + k * 3 * fit->real, fit, frames[fit->place[k]].base);
+    npg_status status = npg_motion_rebase(&fit->motion, fit->device, bases);
+    npg_release(&bases);
+    return status;
+}
+
 static npg_status take_ties(npg_fit *fit, const npg_fit_frame *frames)
 {
     fit->ties = npg_arena_take(&fit->window, fit->tied_count * fit->real + 1, 3 * sizeof(float));
     NPG_TRY(npg_arena_status(&fit->window));
-    for (size_t i = 0; i < fit->tied_count * fit->real; i++)
-        memcpy(fit->ties + 3 * i,
-               frames[fit->place[i / fit->real]].tie + 3 * (size_t)fit->order[i % fit->real],
-               3 * sizeof(float));
+    for (size_t k = 0; k < fit->tied_count; k++)
+        copy_rows(fit->ties + k * 3 * fit->real, fit, frames[fit->place[k]].tie);
     return NPG_OK;
 }
 
@@ -301,6 +318,7 @@ static npg_status open_targets(npg_fit *fit, const npg_fit_frame *frames)
     if (!status) status = open_motion_on(fit, targets);
     for (size_t k = 0; k < count; k++) npg_release((void *)&targets[k].points);
     npg_release(&targets);
+    if (!status) status = take_bases(fit, frames);
     return status ? status : take_ties(fit, frames);
 }
 

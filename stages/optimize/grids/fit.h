@@ -32,6 +32,8 @@ typedef struct npg_fit_frame {
     const float *points; /* N x 3, unit, finite; a loan during npg_fit_begin          */
     size_t count;        /* N; 0: no points, the frame follows from the others        */
     const float *tie;    /* V x 3: known positions, or NULL; a loan likewise          */
+    const float *base;   /* V x 3: what the field turns and moves there; a loan likewise; NULL in all
+                          * frames of a window: the reference                          */
 } npg_fit_frame;
 
 typedef struct npg_fit npg_fit;
@@ -100,10 +102,6 @@ npg_status npg_fit_write_params(npg_fit *fit);
  * one: that around the keyframe is remembered. */
 npg_status npg_fit_recall(npg_fit *fit, const npg_window *window);
 npg_status npg_fit_remember(npg_fit *fit, const npg_window *window);
-
-/* Grids and decoder from one fit to another, whose optimiser stays its own: the moments of another loss would
- * shorten or lengthen its steps for hundreds of epochs. */
-npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from);
 
 /* The present state and, where it is still needed, that after the first window as blocks of a store, and back
  * into a fit of the same settings and reference: NPG_BAD_INPUT where a block has another size. */

@@ -76,20 +76,6 @@ npg_status npg_fit_remember(npg_fit *fit, const npg_window *window)
     return window->direction ? NPG_OK : take(npg_fit_open_parts(fit).first, fit);
 }
 
-npg_status npg_fit_hand_over(npg_fit *to, npg_fit *from)
-{
-    npg_fit_parts source = npg_fit_open_parts(from), target = npg_fit_open_parts(to);
-    float *rows;
-    NPG_TRY(npg_fit_read_params(from));
-    NPG_REQUIRE(source.u->size == target.u->size && source.param_count == target.param_count);
-    memcpy(target.params, source.params, source.param_count * sizeof(float));
-    NPG_TRY(npg_alloc(&rows, NPG_FOR_FIT, source.u->size));
-    npg_status status = npg_buffer_read(source.u, 0, rows, source.u->size);
-    if (!status) status = npg_buffer_write(target.u, 0, rows, source.u->size);
-    npg_release(&rows);
-    return status ? status : npg_fit_write_params(to);
-}
-
 npg_status npg_fit_save(npg_fit *fit, npg_store *store, bool with_first)
 {
     const struct npg_fit_copy *first = npg_fit_open_parts(fit).first;

@@ -1,20 +1,15 @@
 /* Paper: the field from the reference itself, by the paper's robust Chamfer distance over all vertices.
  *
- * The window around the keyframe is solved as in the paper.  Beyond, the paper has nothing: a window starts from
- * what the field knew after the one it borders on.  Its new frames are brought near their pose first, one by one
- * outward from those that are solved, with few vertices, and some of the known frames held in place, so that the
- * field forgets none of them.  Then all frames are fitted, those that are solved tied to where they are: such
- * frames need no gate.  With more than one window rates fall. */
+ * All frames at once are solved as in the paper.  For more it has nothing, and windows start from poses: the tracker
+ * follows the surface outward from the keyframe, or from the last frame that the window before has solved, and in
+ * each frame the field turns and moves the surface as that has it, not the reference.  It is at rest in the
+ * beginning, its grids and layers being those of the window before; frames that are solved are tied to where they
+ * are.  Such frames need no gate, and rates fall. */
 #include <string.h>
 
 #include "geometry/geometry.h"
 #include "optimize/grids/fit.h"
-
-/* By trial (tests/bed/decisions.md, "Warm starts"). */
-#define SAMPLES     1500 /* vertices that new frames are brought near their pose with    */
-#define OPEN_EPOCHS 60   /* of each                                                      */
-#define BESIDE      3 /* solved frames beside a new one, which hold the field in place, and others by turns */
-#define RATE_FACTOR 2 /* of that fit's rates to those over all vertices               */
+#include "track/track.h"
 
 /* Adam's steps keep their length, and what the last one leaves is one draw of many: the result is the state of
  * least loss. */
@@ -33,13 +28,12 @@ typedef struct paper {
     npg_fit *fit;  /* over all vertices */
     progress at;   /* of the window at work, or that a resumed run goes on from inside its own */
     float *best;   /* T x V x 3: where that state had the frames, owned                         */
+    float *poses;  /* T x V x 3: where the tracker has them, owned; NULL of a window alone      */
     size_t best_size;
     /* of the window at work */
     const npg_problem *problem; /* loan */
     npg_solver_watch *watch;
     void *user;
-    int64_t steps, opened; /* epochs of all kinds; those that opening took */
-    bool is_opened;        /* the fit over all vertices is at work          */
 } paper;
 
 static void paper_close(void **slot)
@@ -47,6 +41,7 @@ static void paper_close(void **slot)
     paper *p = *slot;
     npg_fit_close(&p->fit);
     npg_release(&p->best);
+    npg_release(&p->poses);
     npg_release(slot);
 }
 
@@ -85,15 +80,15 @@ static npg_status offer(paper *p, const npg_fit_step *step)
     p->at.next = step->epoch + 1;
     if (!is_least) return NPG_OK;
     p->at.loss = loss;
-    p->at.least = (npg_solved){p->steps, 1, step->chamfer, step->isometry};
+    p->at.least = (npg_solved){step->epochs, 1, step->chamfer, step->isometry};
     return take_positions(p);
 }
 
 static npg_status watch_epoch(void *user, const npg_fit_step *step)
 {
     paper *p = user;
-    const npg_solver_step at = {p->opened + step->epoch, p->steps, step->loss};
-    if (p->is_opened) NPG_TRY(offer(p, step));
+    const npg_solver_step at = {step->epoch, step->epochs, step->loss};
+    NPG_TRY(offer(p, step));
     return p->watch ? p->watch(p->user, &at) : NPG_OK;
 }
 
@@ -108,76 +103,68 @@ static npg_fit_frame frame_of(const paper *p, size_t t)
                            .tie = from->solved};
 }
 
-/* ---- new frames, brought near their pose ---- */
+/* ---- poses to start from ---- */
 
-/* A window's new frames lie at its one end or the other. */
-typedef struct opening {
-    paper *p;
-    npg_proxy *samples;
-    npg_fit *probe; /* over the samples                           */
-    float *poses;   /* T x S x 3: of frames that are known        */
-    size_t known;   /* how many of them there are, from the solved end on */
-    npg_arena arena;
-} opening;
+/* As stage align has them. */
+static const npg_tracker_settings tracking = {
+    .nodes = 1600, .samples = 5000, .steps = 12, .stiffness = 0.006, .along = 0.001};
 
-/* The k-th frame outward from the solved end. */
-static size_t place_of(const opening *o, size_t k)
+/* The keyframe, or what is solved nearest to the new frames. */
+static size_t known_place(const npg_problem *problem, int64_t key)
 {
-    return o->p->problem->window->direction < 0 ? o->p->problem->count - 1 - k : k;
+    size_t at = 0;
+    if (!problem->window->direction) return (size_t)(key - problem->frames[0].index);
+    while (!problem->frames[at].solved) at++;
+    while (problem->window->direction > 0 && at + 1 < problem->count && problem->frames[at + 1].solved) at++;
+    return at;
 }
 
-static npg_status open_probe(opening *o)
+/* The reference as it is in that frame. */
+static npg_status surface_at(npg_mesh **surface, const paper *p, size_t known)
 {
-    paper *p = o->p;
-    npg_fit_settings settings = settings_of(&p->settings);
-    settings.grid.grid_rate *= RATE_FACTOR;
-    settings.grid.mlp_rate *= RATE_FACTOR;
-    settings.paper.confidence = NPG_CONFIDENCE_CONSTANT;
-    settings.rate_end = NPG_GRIDS_RATE_END;
-    NPG_TRY(npg_proxy_open(&o->samples, p->facts->reference, SAMPLES));
-    NPG_TRY(npg_fit_open(&o->probe, p->device, &settings, o->samples->mesh, p->seed));
-    NPG_TRY(npg_fit_hand_over(o->probe, p->fit));
-    size_t size = 3 * o->samples->mesh->vert_count;
-    o->poses = npg_arena_take(&o->arena, p->problem->count, size * sizeof(float));
-    NPG_TRY(npg_arena_status(&o->arena));
-    for (; o->known < p->problem->count && p->problem->frames[place_of(o, o->known)].solved; o->known++)
-        npg_proxy_gather(o->samples, o->poses + o->known * size,
-                         p->problem->frames[place_of(o, o->known)].solved);
+    const npg_mesh *reference = p->facts->reference;
+    const float *solved = p->problem->frames[known].solved;
+    NPG_TRY(npg_mesh_copy(surface, reference));
+    if (!solved) return NPG_OK;
+    memcpy((*surface)->vert_pos, solved, reference->vert_count * 3 * sizeof *solved);
+    npg_mesh_vertex_normals((*surface)->vert_normals, solved, reference->vert_count, reference->faces,
+                            reference->face_count);
     return NPG_OK;
 }
 
-/* The next frame, and those that are held meanwhile. */
-static npg_status open_frame(opening *o)
+/* Outward on both sides as far as nothing is solved; what has no points stays as the frame before it. */
+static npg_status follow(paper *p, npg_follower *follower, size_t known)
 {
-    size_t size = 3 * o->samples->mesh->vert_count, count = 0, places[2 * BESIDE];
-    npg_fit_frame frames[2 * BESIDE + 1];
-    while (count < BESIDE && count < o->known) places[count] = o->known - 1 - count, count++;
-    size_t others = o->known - count, every = (others + BESIDE - 1) / BESIDE;
-    for (size_t k = o->known % (every ? every : 1); k < others && count < 2 * BESIDE; k += every)
-        places[count++] = k;
-    for (size_t i = 0; i < count; i++) {
-        frames[i] = frame_of(o->p, place_of(o, places[i]));
-        frames[i].tie = o->poses + places[i] * size;
+    const npg_solver_frame *frames = p->problem->frames;
+    size_t size = 3 * p->facts->reference->vert_count;
+    for (int step = -1; step <= 1; step += 2) {
+        npg_follower_rest(follower);
+        for (size_t t = known + (size_t)step; t < p->problem->count && !frames[t].solved; t += (size_t)step) {
+            const npg_tracker_cloud cloud = {
+                .points = frames[t].points, .normals = frames[t].normals, .count = frames[t].point_count};
+            if (cloud.count) NPG_TRY(npg_follower_go(follower, &cloud));
+            npg_follower_vertices(follower, p->poses + t * size);
+        }
     }
-    frames[count] = frame_of(o->p, place_of(o, o->known));
-    NPG_TRY(npg_fit_begin(o->probe, frames, count + 1, o->p->facts->plan.key, NULL, NULL));
-    NPG_TRY(npg_fit_run(o->probe, 0, OPEN_EPOCHS, watch_epoch, o->p));
-    NPG_TRY(npg_fit_vertices(o->probe, o->poses + o->known * size, count));
-    o->p->opened += OPEN_EPOCHS;
-    o->known++;
     return NPG_OK;
 }
 
-static npg_status open_new(paper *p)
+static npg_status find_poses(paper *p)
 {
-    opening o = {.p = p, .arena = {.purpose = NPG_FOR_FIT}};
-    npg_status status = open_probe(&o);
-    p->steps += (int64_t)(p->problem->count - o.known) * OPEN_EPOCHS;
-    while (!status && o.known < p->problem->count) status = open_frame(&o);
-    if (!status) status = npg_fit_hand_over(p->fit, o.probe);
-    npg_fit_close(&o.probe);
-    npg_proxy_close(&o.samples);
-    npg_arena_release(&o.arena);
+    npg_follower follower = {0};
+    npg_mesh *surface = NULL;
+    size_t known = known_place(p->problem, p->facts->plan.key), size = 3 * p->facts->reference->vert_count;
+    npg_release(&p->poses);
+    NPG_TRY(npg_alloc_array(&p->poses, NPG_FOR_FIT, p->problem->count * size, sizeof *p->poses));
+    npg_status status = surface_at(&surface, p, known);
+    for (size_t t = 0; t < p->problem->count && !status; t++) {
+        const float *solved = p->problem->frames[t].solved;
+        memcpy(p->poses + t * size, solved ? solved : surface->vert_pos, size * sizeof *solved);
+    }
+    if (!status) status = npg_follower_open(&follower, surface, &tracking);
+    if (!status) status = follow(p, &follower, known);
+    npg_follower_close(&follower);
+    npg_mesh_unref(&surface);
     return status;
 }
 
@@ -187,7 +174,10 @@ static npg_status begin(paper *p)
 {
     npg_fit_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, p->problem->count, sizeof *frames));
-    for (size_t t = 0; t < p->problem->count; t++) frames[t] = frame_of(p, t);
+    for (size_t t = 0; t < p->problem->count; t++) {
+        frames[t] = frame_of(p, t);
+        if (p->poses) frames[t].base = p->poses + t * 3 * p->facts->reference->vert_count;
+    }
     npg_status status = npg_fit_begin(p->fit, frames, p->problem->count, p->facts->plan.key, NULL, NULL);
     npg_release(&frames);
     return status;
@@ -206,18 +196,13 @@ static npg_status take_best(paper *p)
 
 static npg_status solve(paper *p)
 {
-    bool is_warm = p->problem->window->direction != 0;
-    p->steps = p->settings.epochs;
-    if (is_warm && !p->at.next) {
-        NPG_TRY(npg_fit_recall(p->fit, p->problem->window));
-        NPG_TRY(open_new(p));
+    if (!p->is_alone) {
+        if (!p->at.next) NPG_TRY(npg_fit_recall(p->fit, p->problem->window));
+        if (!p->at.next) npg_fit_rest(p->fit);
+        NPG_TRY(find_poses(p));
+        npg_fit_set_pace(p->fit, NPG_CONFIDENCE_CONSTANT, NPG_GRIDS_RATE_END);
     }
-    if (!p->is_alone)
-        npg_fit_set_pace(p->fit,
-                         is_warm ? NPG_CONFIDENCE_CONSTANT : (npg_confidence)p->settings.paper.confidence,
-                         NPG_GRIDS_RATE_END);
     NPG_TRY(begin(p));
-    p->is_opened = true;
     NPG_TRY(npg_fit_run(p->fit, p->at.next, p->settings.epochs, watch_epoch, p));
     return p->at.next ? NPG_OK : take_positions(p);
 }
@@ -229,8 +214,6 @@ static npg_status paper_solve(void *solver, npg_solved *solved, const npg_proble
     p->problem = problem;
     p->watch = watch;
     p->user = user;
-    p->opened = 0;
-    p->is_opened = false;
     NPG_TRY(take_best(p));
     NPG_TRY(solve(p));
     memcpy(problem->result, p->best, p->best_size);
@@ -242,10 +225,7 @@ static npg_status paper_solve(void *solver, npg_solved *solved, const npg_proble
 static size_t paper_memory(const npg_solver_settings *settings, size_t verts, size_t frames, size_t points)
 {
     const npg_fit_settings fit = settings_of(settings);
-    size_t samples = verts < 2 * SAMPLES ? verts : SAMPLES;
-    return npg_fit_memory(&fit, verts, frames, points) +
-           npg_fit_memory(&fit, samples, 2 * BESIDE + 1, points) +
-           frames * (samples + verts) * 3 * sizeof(float);
+    return npg_fit_memory(&fit, verts, frames, points) + 3 * frames * verts * 3 * sizeof(float);
 }
 
 /* ---- states ---- */
@@ -272,13 +252,6 @@ static npg_status paper_restore(void *solver, const npg_record *record)
     return npg_record_get(record, "inside.best", p->best, p->best_size);
 }
 
-/* While new frames are opened the fit over all vertices waits: nothing that could be gone on from. */
-static bool paper_keeps_inside(const void *solver)
-{
-    const paper *p = solver;
-    return p->is_opened;
-}
-
 const npg_solver npg_solver_paper = {
     .name = "paper",
     .needs_device = true,
@@ -287,6 +260,6 @@ const npg_solver npg_solver_paper = {
     .memory = paper_memory,
     .save = paper_save,
     .restore = paper_restore,
-    .keeps_inside = paper_keeps_inside,
+    .keeps_inside = true,
     .close = paper_close,
 };

@@ -131,8 +131,9 @@ static npg_status check_motion(npg_check *check, int size, compare_with *compare
 
 /* ---- transform ---- */
 
-/* The gradient that is passed back here is the positions themselves, brought in as the data term with gain 1. */
-static npg_status compare_transform(motion_data *d)
+/* The gradient that is passed back here is the positions themselves, brought in as the data term with gain 1.
+ * rest: real x 3, of all frames, or of each where `stride` (of a frame) is not 0. */
+static npg_status compare_transform_of(motion_data *d, const double *rest, size_t stride)
 {
     const float gains[FRAMES] = {1, 1, 1};
     npg_motion *motion = &d->motion;
@@ -141,15 +142,26 @@ static npg_status compare_transform(motion_data *d)
     double *dout = npg_arena_take(&d->check->arena, size, sizeof *dout);
     NPG_TRY(npg_arena_status(&d->check->arena));
     for (size_t i = 0; i < FRAMES * d->real; i++) {
-        size_t v = i % d->real, at = (i / d->real * d->rows + v) * NPG_MLP_OUT;
-        npg_transform_ref(d->x + 3 * i, d->out_wide + at, d->rest_wide + 3 * v);
-        npg_transform_back_ref(dout + at, d->x + 3 * i, d->out_wide + at, d->rest_wide + 3 * v);
+        size_t t = i / d->real, v = i % d->real, at = (t * d->rows + v) * NPG_MLP_OUT;
+        npg_transform_ref(d->x + 3 * i, d->out_wide + at, rest + t * stride + 3 * v);
+        npg_transform_back_ref(dout + at, d->x + 3 * i, d->out_wide + at, rest + t * stride + 3 * v);
     }
     NPG_TRY(compare_frames(d, &motion->x, d->x));
     NPG_TRY(npg_buffer_read(&motion->x, 0, x, bytes));
     NPG_TRY(npg_buffer_write(&motion->g, 0, x, bytes));
     NPG_TRY(npg_motion_back(motion, d->dout_buffer, d->out_buffer, gains, 0, 0, FRAMES));
     return npg_check_compare_buffer(d->check, d->dout_buffer, dout, size);
+}
+
+static npg_status compare_transform(motion_data *d)
+{
+    double *wide;
+    NPG_TRY(compare_transform_of(d, d->rest_wide, 0));
+    float *bases = npg_check_values(d->check, &wide, FRAMES * d->real * 3, 0.9);
+    NPG_TRY(npg_arena_status(&d->check->arena));
+    NPG_TRY(npg_motion_rebase(&d->motion, d->check->device, bases));
+    NPG_TRY(npg_motion_apply(&d->motion, d->out_buffer, 0, FRAMES));
+    return compare_transform_of(d, wide, 3 * d->real);
 }
 
 npg_status npg_check_transform(npg_check *check, int size)
