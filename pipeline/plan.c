@@ -42,7 +42,7 @@ npg_window npg_plan_key_window(const npg_plan *plan, int64_t total)
     int64_t count = plan->first_count ? plan->first_count : count_of(plan, total);
     int64_t last = min_of(max_of(plan->key - plan->window / 2, 0) + plan->window, count) - 1;
     int64_t first = max_of(last - plan->window + 1, 0);
-    return (npg_window){first, last, -1, first, last, 0};
+    return (npg_window){first, last, first, last, 0};
 }
 
 static int64_t step_of(const npg_plan *plan)
@@ -63,22 +63,19 @@ int64_t npg_plan_window_count(const npg_plan *plan, int64_t total)
     return 1 + windows_for(plan, key.first) + windows_for(plan, count_of(plan, total) - 1 - key.last);
 }
 
-/* The windows of one direction are counted from 0, and each starts from the one before it, `from`. */
-static npg_window backward_window(const npg_plan *plan, const npg_window *key, int64_t place, int64_t from,
-                                  int64_t count)
+/* The windows of one direction are counted from 0. */
+static npg_window backward_window(const npg_plan *plan, const npg_window *key, int64_t place, int64_t count)
 {
     int64_t new_last = key->first - 1 - place * step_of(plan);
     int64_t new_first = max_of(new_last - step_of(plan) + 1, 0);
     return (npg_window){.first = new_first,
                         .last = min_of(new_first + plan->window, count) - 1,
-                        .from = from,
                         .new_first = new_first,
                         .new_last = new_last,
                         .direction = -1};
 }
 
-static npg_window forward_window(const npg_plan *plan, int64_t begin, int64_t place, int64_t from,
-                                 int64_t count)
+static npg_window forward_window(const npg_plan *plan, int64_t begin, int64_t place, int64_t count)
 {
     int64_t new_first = begin + place * step_of(plan),
             new_last = min_of(new_first + step_of(plan), count) - 1;
@@ -86,7 +83,7 @@ static npg_window forward_window(const npg_plan *plan, int64_t begin, int64_t pl
     if (plan->appended_at) first = new_first - plan->overlap;
     /* never earlier, even where it ends */
     if (npg_plan_is_open(plan)) first = new_first - min_of(plan->overlap, plan->window - 1);
-    return (npg_window){max_of(first, 0), new_last, from, new_first, new_last, 1};
+    return (npg_window){max_of(first, 0), new_last, new_first, new_last, 1};
 }
 
 npg_window npg_plan_window(const npg_plan *plan, int64_t i, int64_t total)
@@ -94,14 +91,14 @@ npg_window npg_plan_window(const npg_plan *plan, int64_t i, int64_t total)
     const int64_t count = count_of(plan, total);
     const npg_window key = npg_plan_key_window(plan, total);
     assert(i >= 0 && i < npg_plan_window_count(plan, total));
-    if (plan->appended_at) return forward_window(plan, plan->appended_at, i, i - 1, count);
+    if (plan->appended_at) return forward_window(plan, plan->appended_at, i, count);
     if (i == 0) return key;
     /* The direction that comes first: of an open plan nobody knows how many the forward ones are. */
     bool is_open = npg_plan_is_open(plan);
     int64_t firsts = windows_for(plan, is_open ? key.first : count - 1 - key.last);
-    int64_t place = i <= firsts ? i - 1 : i - 1 - firsts, from = place ? i - 1 : 0;
-    return (i <= firsts) == is_open ? backward_window(plan, &key, place, from, count)
-                                    : forward_window(plan, key.last + 1, place, from, count);
+    int64_t place = i <= firsts ? i - 1 : i - 1 - firsts;
+    return (i <= firsts) == is_open ? backward_window(plan, &key, place, count)
+                                    : forward_window(plan, key.last + 1, place, count);
 }
 
 int64_t npg_plan_read_count(const npg_plan *plan)
@@ -166,16 +163,6 @@ static int64_t backward_count(const npg_plan *plan, int64_t total)
 {
     return npg_plan_is_open(plan) ? windows_for(plan, npg_plan_key_window(plan, total).first)
                                   : npg_plan_window_count(plan, total) - 1;
-}
-
-/* Those are windows 1 of either side: the first that do not are followed by none. */
-bool npg_plan_is_first_needed_after(const npg_plan *plan, int64_t i, int64_t total)
-{
-    if (plan->appended_at) return false;
-    int64_t count = min_of(npg_plan_window_count(plan, total), backward_count(plan, total) + 2);
-    for (int64_t w = max_of(i + 1, 1); w < count; w++)
-        if (npg_plan_window(plan, w, total).from == 0) return true;
-    return false;
 }
 
 bool npg_plan_is_needed_after(const npg_plan *plan, int64_t index, int64_t i, int64_t total)

@@ -2,7 +2,7 @@
  *
  * Windows go outward from the one that holds the keyframe: window 0 is around it,
  * then all later windows forward in time, then all earlier ones backward.
- * A window shares `overlap` frames with the one it starts from.  Windows of appended frames continue forward,
+ * A window shares `overlap` frames with the one it borders on.  Windows of appended frames continue forward,
  * each with the last `overlap` frames before its new ones.
  *
  * A live source gets an ordinary plan when it ends inside the look-ahead (its results are then
@@ -10,7 +10,7 @@
  * Under an open plan the windows are
  *   0                 around the keyframe; later frames than the look-ahead's may belong to it
  *   1 .. B            backward to frame 0; all their frames came before the plan was made
- *   B + 1, B + 2, ..  forward for as long as frames come; the first of them starts from window 0
+ *   B + 1, B + 2, ..  forward for as long as frames come; the first of them borders on window 0
  * so that a stage that solves window after window holds two windows of frames at most (the look-ahead and a
  * window where the source ends inside window 0), however long the source lasts.  A forward window begins
  * `overlap` frames before its new ones even where the source ends inside it, so nothing older has to be kept;
@@ -41,7 +41,6 @@ typedef struct npg_plan {
 
 typedef struct npg_window {
     int64_t first, last;         /* frames first..last, both inclusive             */
-    int64_t from;                /* the window it starts from, -1 for window 0     */
     int64_t new_first, new_last; /* the frames no earlier window has solved        */
     int direction;               /* 0 around the keyframe, +1 forward, -1 backward */
 } npg_window;
@@ -90,9 +89,6 @@ int64_t npg_plan_next_place(const npg_plan *plan, int64_t read, int64_t total);
 
 /* Whether the frame is one of the first `read` that came. */
 bool npg_plan_is_read(const npg_plan *plan, int64_t index, int64_t read, int64_t total);
-
-/* Whether a window after window i starts from window 0. */
-bool npg_plan_is_first_needed_after(const npg_plan *plan, int64_t i, int64_t total);
 
 /* Whether a window after window i holds the frame: until then it must be kept. */
 bool npg_plan_is_needed_after(const npg_plan *plan, int64_t index, int64_t i, int64_t total);

@@ -53,7 +53,9 @@ static const npg_preset_value none[] = {
 const npg_preset npg_presets[] = {
     {"method", "default", "alignment frame by frame, then a joint fit of windows of frames", none},
     {"method", "paper",
-     "the method as the paper has it: every vertex, from the reference, all frames at once up to 60", paper},
+     "the method as the paper has it: every vertex, from the reference, all frames at once up to 60; beyond, "
+     "windows from aligned poses",
+     paper},
     {"method", "paper-1000", "the same with its 1000 epochs", paper_1000},
     {"method", "grids",
      "the same as default, the fit of windows by the paper's grids and decoder over the aligned poses",

@@ -81,9 +81,7 @@ static npg_status write_state(void *user, npg_store *out, const char *grids_path
     const npg_facts *facts = npg_worker_facts(s->worker);
     const npg_hand *hand = s->hand;
     const saved_progress progress = {hand->window_at, hand->total, hand->last};
-    npg_solver_moment moment = {s->is_inside,
-                                npg_plan_is_first_needed_after(&facts->plan, hand->window_at, hand->total),
-                                hand->window_at, .grids_path = grids_path};
+    npg_solver_moment moment = {s->is_inside, hand->window_at, .grids_path = grids_path};
     if (hand->window_at >= 0) moment.window = npg_plan_window(&facts->plan, hand->window_at, hand->total);
     NPG_TRY(npg_store_put(out, "progress", &progress, sizeof progress));
     NPG_TRY(put_frames(out, hand, facts->reference->vert_count));

@@ -409,6 +409,15 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
     return solve_complete_windows(worker);
 }
 
+/* At most, of a window. */
+static int64_t epochs_of(const npg_worker *worker)
+{
+    const state *s = npg_worker_state(worker);
+    return npg_solver_of(worker)->needs_poses
+               ? s->settings.epochs
+               : npg_paper_epochs(&s->settings, &npg_worker_facts(worker)->plan);
+}
+
 static npg_status flush(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
@@ -419,7 +428,7 @@ static npg_status flush(npg_worker *worker)
                          (long long)s->hand.window_at, (long long)s->window.first, (long long)s->window.last);
     json_t *report = npg_worker_report(worker);
     json_object_set_new(report, "windows", json_integer(s->window_count));
-    json_object_set_new(report, "epochs", json_integer(s->settings.epochs));
+    json_object_set_new(report, "epochs", json_integer(epochs_of(worker)));
     json_object_set_new(report, "solver", json_string(s->row->name));
     if (s->row->needs_poses) return NPG_OK;
     json_object_set_new(report, "last_chamfer", json_real(s->result.solved.distance));
@@ -451,7 +460,7 @@ static double expects(const npg_worker *worker, npg_pass pass)
     double vertices = (double)npg_worker_verts_at_most(worker);
     double sample =
         npg_cost_decoder_flops((double)s->settings.grid.width_1, (double)s->settings.grid.width_2);
-    return cores * npg_cost_network_s(frames * vertices * (double)s->settings.epochs * sample,
+    return cores * npg_cost_network_s(frames * vertices * (double)epochs_of(worker) * sample,
                                       cores * NPG_COST_CORE_FLOPS);
 }
 

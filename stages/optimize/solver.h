@@ -81,7 +81,7 @@ typedef npg_status npg_solver_watch(void *user, const npg_solver_step *step);
 
 /* What a state is written for: after window `at`, or inside the one after it. */
 typedef struct npg_solver_moment {
-    bool is_inside, is_first_needed; /* a later window starts from window 0 */
+    bool is_inside;
     int64_t at;
     npg_window window;
     const char *grids_path; /* where latent grids go, NULL inside a window */
@@ -101,6 +101,10 @@ typedef struct npg_solver {
     bool keeps_inside; /* the window at work can be gone on from after any step: windows are long */
     void (*close)(void **solver);
 } npg_solver;
+
+/* Epochs of each of the paper's windows: one of several starts near where it is to end, and has a tenth of those of
+ * one over all frames, which starts at the reference. */
+int64_t npg_paper_epochs(const npg_solver_settings *settings, const npg_plan *plan);
 
 /* The row that a run's options and stages ask for. */
 const npg_solver *npg_solver_of(const npg_worker *worker);

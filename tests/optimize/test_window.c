@@ -205,7 +205,7 @@ static const npg_solver_settings aligned = {.epochs = 60, .energy = {.points = 5
 static void way_from_the_first(double way[2])
 {
     npg_facts facts = {.reference = ball, .plan = {.frame_count = 8, .window = 5, .overlap = 2}};
-    const npg_window first = {0, 4, -1, 0, 4, 0}, second = {3, 7, 0, 5, 7, 1};
+    const npg_window first = {0, 4, 0, 4, 0}, second = {3, 7, 5, 7, 1};
     npg_window_solver *solver;
     npg_window_result result;
     npg_held held[8] = {{{0}, NULL}}, *all[8];
@@ -264,7 +264,7 @@ static void solve_gone(float solved[3 * VERTS], const npg_solver *row, float way
     npg_solver_settings settings = aligned;
     npg_facts facts = {.reference = ball, .plan = {.frame_count = 2, .window = 2}};
     settings.grid = small_grid;
-    const npg_window window = {0, 1, -1, 0, 1, 0};
+    const npg_window window = {0, 1, 0, 1, 0};
     npg_window_solver *solver;
     npg_window_result result;
     npg_held held[2] = {{{0}, NULL}};

@@ -16,7 +16,6 @@ static void check_plan(npg_plan plan)
     for (int64_t w = 0; w < npg_plan_window_count(&plan, -1); w++) {
         npg_window window = npg_plan_window(&plan, w, -1);
         assert_true(window.first >= 0 && window.last < plan.frame_count && window.first <= window.last);
-        assert_true(window.from < w);
         for (int64_t i = window.new_first; i <= window.new_last; i++) {
             int64_t frame = npg_plan_frame(&plan, next++);
             assert_true(frame >= window.new_first && frame <= window.new_last);

@@ -29,8 +29,7 @@ struct npg_fit {
     npg_sobolev sobolev;
     npg_buffer u, nodes, dnodes; /* differential coordinates, features, gradient: [nodes][32] */
     npg_adam grid_adam, mlp_adam;
-    float *params;             /* decoder's parameters between windows */
-    struct npg_fit_copy first; /* owned */
+    float *params; /* decoder's parameters between windows */
     uint64_t seed;
     npg_arena window; /* holds the arrays of the window */
     npg_mlp mlp;
@@ -210,7 +209,6 @@ void npg_fit_close(npg_fit **slot)
     npg_buffer_close(&fit->nodes);
     npg_buffer_close(&fit->dnodes);
     npg_release(&fit->edges);
-    npg_release(&fit->first.bytes);
     npg_arena_release(&fit->arrays);
     npg_release(slot);
 }
@@ -575,8 +573,7 @@ npg_fit_parts npg_fit_open_parts(npg_fit *fit)
 {
     npg_mlp_shape shape = shape_of(&fit->settings.grid);
     return (npg_fit_parts){&fit->levels,   &fit->u,     &fit->grid_adam,
-                           &fit->mlp_adam, fit->params, npg_mlp_places_of(&shape).end,
-                           &fit->first};
+                           &fit->mlp_adam, fit->params, npg_mlp_places_of(&shape).end};
 }
 
 #define UNITS 2 /* of the device, whose scratch memory counts: on more the drivers' own counts more */

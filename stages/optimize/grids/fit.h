@@ -85,10 +85,6 @@ typedef struct npg_fit_parts {
     struct npg_adam *grid_adam, *mlp_adam;
     float *params; /* of the decoder after the last run */
     size_t param_count;
-    struct npg_fit_copy {
-        char *bytes; /* all parts one behind the other; NULL: none */
-        size_t size;
-    } * first; /* after the window around the keyframe */
 } npg_fit_parts;
 
 npg_fit_parts npg_fit_open_parts(npg_fit *fit);
@@ -98,14 +94,9 @@ npg_fit_parts npg_fit_open_parts(npg_fit *fit);
 npg_status npg_fit_read_params(npg_fit *fit);
 npg_status npg_fit_write_params(npg_fit *fit);
 
-/* Before a window: where it borders on that around the keyframe, the fit is what it was after that one.  After
- * one: that around the keyframe is remembered. */
-npg_status npg_fit_recall(npg_fit *fit, const npg_window *window);
-npg_status npg_fit_remember(npg_fit *fit, const npg_window *window);
-
-/* The present state and, where it is still needed, that after the first window as blocks of a store, and back
- * into a fit of the same settings and reference: NPG_BAD_INPUT where a block has another size. */
-npg_status npg_fit_save(npg_fit *fit, npg_store *store, bool with_first);
+/* The present state as a block of a store, and back into a fit of the same settings and reference: NPG_BAD_INPUT
+ * where it has another size. */
+npg_status npg_fit_save(npg_fit *fit, npg_store *store);
 npg_status npg_fit_restore(npg_fit *fit, const npg_record *record);
 
 /* Which latent grids a fit has, from its settings (paper, latent grids); all zero before. */

@@ -254,7 +254,6 @@ double npg_grids_time(const npg_plan *plan, double span, int64_t index)
 static npg_status begin(grids *g, const npg_problem *problem)
 {
     npg_fit_frame *frames;
-    NPG_TRY(npg_fit_recall(g->fit, problem->window));
     npg_fit_rest(g->fit);
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, problem->count, sizeof *frames));
     for (size_t t = 0; t < problem->count; t++)
@@ -295,7 +294,6 @@ static npg_status grids_solve(void *solver, npg_solved *solved, const npg_proble
     npg_status status = take_window(g, problem);
     if (!status) status = begin(g, problem);
     if (!status) status = npg_fit_run(g->fit, 0, g->epochs, watch_epoch, g);
-    if (!status) status = npg_fit_remember(g->fit, problem->window);
     *solved = (npg_solved){.steps = g->epochs, .energy = g->at_start > 0 ? g->least / g->at_start : 1};
     npg_arena_release(&g->window);
     return status;
@@ -351,7 +349,7 @@ npg_status npg_grids_save(npg_fit *fit, const npg_facts *facts, npg_store *store
                           const npg_solver_moment *moment)
 {
     if (!moment->is_inside) NPG_TRY(put_latents(fit, facts, store, moment));
-    return npg_fit_save(fit, store, moment->is_first_needed);
+    return npg_fit_save(fit, store);
 }
 
 static npg_status grids_save(void *solver, npg_store *store, const npg_solver_moment *moment)

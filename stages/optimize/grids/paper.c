@@ -20,15 +20,12 @@ typedef struct progress {
 } progress;
 
 typedef struct paper {
-    npg_device *device;     /* loan */
     const npg_facts *facts; /* loan */
     npg_solver_settings settings;
-    uint64_t seed;
-    bool is_alone; /* one window over all frames */
-    npg_fit *fit;  /* over all vertices */
-    progress at;   /* of the window at work, or that a resumed run goes on from inside its own */
-    float *best;   /* T x V x 3: where that state had the frames, owned                         */
-    float *poses;  /* T x V x 3: where the tracker has them, owned; NULL of a window alone      */
+    npg_fit *fit; /* over all vertices */
+    progress at;  /* of the window at work, or that a resumed run goes on from inside its own */
+    float *best;  /* T x V x 3: where that state had the frames, owned                         */
+    float *poses; /* T x V x 3: where the tracker has them, owned; NULL of a window alone      */
     size_t best_size;
     /* of the window at work */
     const npg_problem *problem; /* loan */
@@ -50,19 +47,29 @@ static npg_fit_settings settings_of(const npg_solver_settings *s)
     return (npg_fit_settings){.grid = s->grid, .paper = s->paper, .rate_end = 1};
 }
 
+/* Where frames start near, more epochs lower the loss, and go away from the truth: tests/bed/decisions.md, "The paper's
+ * fit beyond one window". */
+#define SHARE_OF_EPOCHS 10
+
+static bool is_whole(const npg_plan *plan)
+{
+    return plan->window >= plan->frame_count;
+}
+
+int64_t npg_paper_epochs(const npg_solver_settings *settings, const npg_plan *plan)
+{
+    return is_whole(plan) ? settings->epochs : (settings->epochs + SHARE_OF_EPOCHS - 1) / SHARE_OF_EPOCHS;
+}
+
 static npg_status paper_open(void **out, const npg_solver_setup *setup)
 {
     paper *p;
     const npg_fit_settings settings = settings_of(setup->settings);
-    const npg_plan *plan = &setup->facts->plan;
     NPG_TRY(npg_alloc(&p, NPG_FOR_FIT, sizeof *p));
     *out = p;
-    p->device = setup->device;
     p->facts = setup->facts;
     p->settings = *setup->settings;
-    p->seed = setup->seed;
-    p->is_alone = plan->window >= plan->frame_count;
-    return npg_fit_open(&p->fit, p->device, &settings, setup->surface, p->seed);
+    return npg_fit_open(&p->fit, setup->device, &settings, setup->surface, setup->seed);
 }
 
 /* The field's positions are those that the epoch measured. */
@@ -94,13 +101,14 @@ static npg_status watch_epoch(void *user, const npg_fit_step *step)
 
 static npg_fit_frame frame_of(const paper *p, size_t t)
 {
+    const npg_plan *plan = &p->facts->plan;
     const npg_solver_frame *from = &p->problem->frames[t];
     return (npg_fit_frame){.index = from->index,
-                           .time =
-                               npg_grids_time(&p->facts->plan, p->is_alone ? 1 : NPG_GRIDS_SPAN, from->index),
+                           .time = npg_grids_time(plan, is_whole(plan) ? 1 : NPG_GRIDS_SPAN, from->index),
                            .points = from->points,
                            .count = from->point_count,
-                           .tie = from->solved};
+                           .tie = from->solved,
+                           .base = p->poses ? p->poses + t * 3 * p->facts->reference->vert_count : NULL};
 }
 
 /* ---- poses to start from ---- */
@@ -174,10 +182,7 @@ static npg_status begin(paper *p)
 {
     npg_fit_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, p->problem->count, sizeof *frames));
-    for (size_t t = 0; t < p->problem->count; t++) {
-        frames[t] = frame_of(p, t);
-        if (p->poses) frames[t].base = p->poses + t * 3 * p->facts->reference->vert_count;
-    }
+    for (size_t t = 0; t < p->problem->count; t++) frames[t] = frame_of(p, t);
     npg_status status = npg_fit_begin(p->fit, frames, p->problem->count, p->facts->plan.key, NULL, NULL);
     npg_release(&frames);
     return status;
@@ -196,14 +201,14 @@ static npg_status take_best(paper *p)
 
 static npg_status solve(paper *p)
 {
-    if (!p->is_alone) {
-        if (!p->at.next) NPG_TRY(npg_fit_recall(p->fit, p->problem->window));
+    const npg_plan *plan = &p->facts->plan;
+    if (!is_whole(plan)) {
         if (!p->at.next) npg_fit_rest(p->fit);
         NPG_TRY(find_poses(p));
         npg_fit_set_pace(p->fit, NPG_CONFIDENCE_CONSTANT, NPG_GRIDS_RATE_END);
     }
     NPG_TRY(begin(p));
-    NPG_TRY(npg_fit_run(p->fit, p->at.next, p->settings.epochs, watch_epoch, p));
+    NPG_TRY(npg_fit_run(p->fit, p->at.next, npg_paper_epochs(&p->settings, plan), watch_epoch, p));
     return p->at.next ? NPG_OK : take_positions(p);
 }
 
@@ -219,7 +224,7 @@ static npg_status paper_solve(void *solver, npg_solved *solved, const npg_proble
     memcpy(problem->result, p->best, p->best_size);
     *solved = p->at.least;
     p->at = (progress){0};
-    return npg_fit_remember(p->fit, problem->window);
+    return NPG_OK;
 }
 
 static size_t paper_memory(const npg_solver_settings *settings, size_t verts, size_t frames, size_t points)
