@@ -20,9 +20,6 @@
 #define POINTS_MOST 4  /* times the samples: points of a frame that are kept for the alignment */
 #define GROUP_MOST  96 /* frames that wait: a longer window is taken in parts                 */
 
-#define RAY_BYTES   64  /* of a sample of the surface, to tell whether a sensor sees it */
-#define PRIOR_BYTES 512 /* of a node: how its edges are held, and by what is seen of it */
-
 /* Points past the border of a side of the body are carried by the border's motion, which is theirs while the
  * body moves as one piece: then it is followed as far as it has places for half of a frame's points, else as
  * far as the brief says. */
@@ -499,14 +496,12 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t known = NPG_POSE_SIZE * (sizeof(double) + sizeof(float)) + NPG_GRAPH_BIND * 2 * sizeof(float) +
                    3 * sizeof(float);
     *chunks_held = (group + chunk - 1) / chunk + 1;
-    /* two sides of two poses, twice; blocks of the equations, about 20 pairs a node, and how both ends hold
-     * them; per vertex weights and the graph's search for them, positions, normals; the waiting frames'
-     * poses, once more for the log, what they hide, thinned points, and free space */
-    return nodes * (8 * NPG_POSE_SIZE * sizeof(double) + 22 * 36 * sizeof(double) + PRIOR_BYTES + known) +
-           verts * 320 +
+    /* two sides of two poses, twice; the waiting frames' poses, once more for the log, what they hide, thinned
+     * points, and free space */
+    return npg_tracker_memory(nodes, (size_t)s->samples, verts) +
+           nodes * (8 * NPG_POSE_SIZE * sizeof(double) + known) +
            group * (nodes * (2 * NPG_POSE_SIZE * sizeof(double) + sizeof(float)) +
-                    points * 6 * sizeof(float) + npg_free_space_memory(facts->view_count_max)) +
-           (size_t)s->samples * RAY_BYTES;
+                    points * 6 * sizeof(float) + npg_free_space_memory(facts->view_count_max));
 }
 
 const npg_stage npg_stage_align = {

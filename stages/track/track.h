@@ -224,6 +224,9 @@ typedef struct npg_tracked {
 /* reference: unit coordinates with normals; counted reference kept. */
 npg_status npg_tracker_open(npg_tracker **tracker, npg_mesh *reference, const npg_tracker_settings *settings);
 void npg_tracker_close(npg_tracker **tracker);
+
+/* Bytes at most over a surface of so many vertices. */
+size_t npg_tracker_memory(size_t nodes, size_t samples, size_t verts);
 size_t npg_tracker_node_count(const npg_tracker *tracker);
 
 /* Whether the reference has a border. */

@@ -68,6 +68,16 @@ struct npg_tracker {
     } * sums;                          /* of each grain of targets */
 };
 
+#define RAY_BYTES   64  /* of a sample of the surface, to tell whether a sensor sees it */
+#define PRIOR_BYTES 512 /* of a node: how its edges are held, and by what is seen of it */
+
+/* Blocks of the equations, about 20 pairs a node, and how both ends hold them; per vertex weights and the graph's
+ * search for them, positions, normals. */
+size_t npg_tracker_memory(size_t nodes, size_t samples, size_t verts)
+{
+    return nodes * (22 * 36 * sizeof(double) + PRIOR_BYTES) + verts * 320 + samples * RAY_BYTES;
+}
+
 size_t npg_tracker_node_count(const npg_tracker *tracker)
 {
     return tracker->graph->node_count;

@@ -230,7 +230,8 @@ static npg_status paper_solve(void *solver, npg_solved *solved, const npg_proble
 static size_t paper_memory(const npg_solver_settings *settings, size_t verts, size_t frames, size_t points)
 {
     const npg_fit_settings fit = settings_of(settings);
-    return npg_fit_memory(&fit, verts, frames, points) + 3 * frames * verts * 3 * sizeof(float);
+    return npg_fit_memory(&fit, verts, frames, points) + 3 * frames * verts * 3 * sizeof(float) +
+           npg_tracker_memory(tracking.nodes, tracking.samples, verts);
 }
 
 /* ---- states ---- */
