@@ -524,12 +524,6 @@ void npg_fit_rest(npg_fit *fit)
     memset(fit->params + at.head_bias, 0, (at.w1z - at.head_bias) * sizeof *fit->params);
 }
 
-void npg_fit_set_pace(npg_fit *fit, npg_confidence confidence, double rate_end)
-{
-    fit->settings.paper.confidence = confidence;
-    fit->settings.rate_end = rate_end;
-}
-
 npg_status npg_fit_run(npg_fit *fit, int64_t first, int64_t end, npg_fit_watch *watch, void *user)
 {
     npg_fit_step step = {.epoch = first, .epochs = end};

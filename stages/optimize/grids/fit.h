@@ -64,9 +64,6 @@ npg_status npg_fit_begin(npg_fit *fit, const npg_fit_frame *frames, size_t count
 /* Before a window: the field is at rest, zero or the reference, whatever it knows: the decoder's head is zero. */
 void npg_fit_rest(npg_fit *fit);
 
-/* The confidence and the last learning rates (as a share of the first) from now on. */
-void npg_fit_set_pace(npg_fit *fit, npg_confidence confidence, double rate_end);
-
 /* Epochs first .. end - 1 of the rates and the confidence that are laid out for `end` (first > 0 continues a
  * run that was broken off); afterwards npg_fit_vertices() gives the result.  With none of them it is what the
  * field has now.  NPG_DIVERGED names epoch and frame. */

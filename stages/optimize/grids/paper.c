@@ -64,11 +64,15 @@ int64_t npg_paper_epochs(const npg_solver_settings *settings, const npg_plan *pl
 static npg_status paper_open(void **out, const npg_solver_setup *setup)
 {
     paper *p;
-    const npg_fit_settings settings = settings_of(setup->settings);
+    npg_fit_settings settings = settings_of(setup->settings);
     NPG_TRY(npg_alloc(&p, NPG_FOR_FIT, sizeof *p));
     *out = p;
     p->facts = setup->facts;
     p->settings = *setup->settings;
+    if (!is_whole(&p->facts->plan)) {
+        settings.paper.confidence = NPG_CONFIDENCE_CONSTANT;
+        settings.rate_end = NPG_GRIDS_RATE_END;
+    }
     return npg_fit_open(&p->fit, setup->device, &settings, setup->surface, setup->seed);
 }
 
@@ -205,7 +209,6 @@ static npg_status solve(paper *p)
     if (!is_whole(plan)) {
         if (!p->at.next) npg_fit_rest(p->fit);
         NPG_TRY(find_poses(p));
-        npg_fit_set_pace(p->fit, NPG_CONFIDENCE_CONSTANT, NPG_GRIDS_RATE_END);
     }
     NPG_TRY(begin(p));
     NPG_TRY(npg_fit_run(p->fit, p->at.next, npg_paper_epochs(&p->settings, plan), watch_epoch, p));
