@@ -38,7 +38,7 @@ static const npg_preset_value grids[] = {
     {"grid-levels", "6"},      /* of few vertices: eight cost a third more for 0.002 of the energy */
     {"grid-rate", "0.03"},
     {"mlp-rate",  "0.004"},
-    {"epochs",    "150"},
+    {"epochs",    "100"},
     {NULL, NULL}};
 static const npg_preset_value quick[] = {
     {"keyframe-choice", "paper"}, {"reference-from", "key"}, {NULL, NULL}};
