@@ -1,6 +1,8 @@
 /* Follower: the tracker along a row of frames. */
 #include "track/track.h"
 
+#include <string.h>
+
 npg_status npg_follower_open(npg_follower *f, npg_mesh *mesh, const npg_tracker_settings *settings)
 {
     *f = (npg_follower){.arena = {.purpose = NPG_FOR_FIT}};
@@ -24,6 +26,14 @@ void npg_follower_rest(npg_follower *f)
 {
     npg_pose_rest(f->pose, npg_tracker_node_count(f->tracker));
     npg_pose_rest(f->before, npg_tracker_node_count(f->tracker));
+}
+
+npg_status npg_follower_start(npg_follower *f, const float *placed)
+{
+    NPG_TRY(npg_pose_of(f->pose, npg_tracker_graph(f->tracker), npg_tracker_reference(f->tracker)->vert_pos,
+                        placed));
+    memcpy(f->before, f->pose, npg_pose_bytes(npg_tracker_node_count(f->tracker)));
+    return NPG_OK;
 }
 
 npg_status npg_follower_go(npg_follower *f, const npg_tracker_cloud *cloud)

@@ -80,3 +80,46 @@ npg_status npg_pose_bend(double *bend, const npg_graph *graph, const double *pos
     *bend = graph->node_count ? sqrt(sum / (double)graph->node_count) : 0;
     return NPG_OK;
 }
+
+/* The vertices that node k carries are of[first[k]] .. of[first[k + 1] - 1]; first (K + 1) and next (K) are zero
+ * before. */
+static void list_by_node(size_t *first, size_t *next, uint32_t *of, const npg_graph *graph)
+{
+    size_t count = graph->vert_count * NPG_GRAPH_BIND;
+    for (size_t i = 0; i < count; i++)
+        if (graph->vert_node[i] != UINT32_MAX) first[graph->vert_node[i] + 1]++;
+    for (size_t k = 0; k < graph->node_count; k++) first[k + 1] += next[k] = first[k];
+    for (size_t i = 0; i < count; i++)
+        if (graph->vert_node[i] != UINT32_MAX)
+            of[next[graph->vert_node[i]]++] = (uint32_t)(i / NPG_GRAPH_BIND);
+}
+
+npg_status npg_pose_of(double *pose, const npg_graph *graph, const float *rest, const float *placed)
+{
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
+    size_t count = graph->vert_count * NPG_GRAPH_BIND;
+    size_t *first = npg_arena_take(&scratch, graph->node_count + 1, sizeof *first);
+    size_t *next = npg_arena_take(&scratch, graph->node_count, sizeof *next);
+    uint32_t *of = npg_arena_take(&scratch, count, sizeof *of);
+    float *from = npg_arena_take(&scratch, count, 3 * sizeof *from);
+    float *to = npg_arena_take(&scratch, count, 3 * sizeof *to);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) list_by_node(first, next, of, graph);
+    npg_pose_rest(pose, graph->node_count);
+    for (size_t k = 0; k < graph->node_count && !status; k++, pose += NPG_POSE_SIZE) {
+        double rotation[3][3], translation[3];
+        size_t verts = first[k + 1] - first[k];
+        if (!verts) continue;
+        npg_rows_gather(from, rest, of + first[k], verts);
+        npg_rows_gather(to, placed, of + first[k], verts);
+        npg_rigid_fit(rotation, translation, from, to, verts);
+        for (size_t i = 0; i < 9; i++) pose[i] = rotation[i / 3][i % 3];
+        for (size_t row = 0; row < 3; row++) {
+            pose[9 + row] = translation[row] - (double)graph->node_pos[3 * k + row];
+            for (size_t c = 0; c < 3; c++)
+                pose[9 + row] += rotation[row][c] * (double)graph->node_pos[3 * k + c];
+        }
+    }
+    npg_arena_release(&scratch);
+    return status;
+}

@@ -47,6 +47,10 @@ static inline size_t npg_pose_bytes(size_t node_count)
 /* All nodes at rest.  pose: K x 12. */
 void npg_pose_rest(double *pose, size_t node_count);
 
+/* The pose in which vertices (V x 3) that are at `rest` in the graph come nearest to where they are `placed`: each
+ * node moves as the vertices that it carries do, in the sense of least squares.  NPG_MEMORY. */
+npg_status npg_pose_of(double *pose, const npg_graph *graph, const float *rest, const float *placed);
+
 /* Where a point that the nodes carry goes. */
 void npg_pose_point(double out[3], const npg_graph *graph, const double *pose, const float rest[3],
                     const uint32_t nodes[NPG_GRAPH_BIND], const float weights[NPG_GRAPH_BIND]);
@@ -283,8 +287,9 @@ typedef struct npg_follower {
 npg_status npg_follower_open(npg_follower *follower, npg_mesh *mesh, const npg_tracker_settings *settings);
 void npg_follower_close(npg_follower *follower);
 
-/* Back to where the mesh is. */
+/* Back to where the mesh is, or to the pose nearest to where its vertices are placed (V x 3).  NPG_MEMORY. */
 void npg_follower_rest(npg_follower *follower);
+npg_status npg_follower_start(npg_follower *follower, const float *placed);
 
 /* To the next frame, of one point at least. */
 npg_status npg_follower_go(npg_follower *follower, const npg_tracker_cloud *cloud);

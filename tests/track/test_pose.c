@@ -1,5 +1,5 @@
 /* Pose: poses stay rotations, however many frames they are carried on; a pose is moved as a whole, and that
- * motion is found again. */
+ * motion is found again; a pose is found from where vertices are. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -113,10 +113,49 @@ static void a_bend_is_what_no_rigid_motion_explains(void **state)
     npg_mesh_unref(&ball);
 }
 
+/* All nodes have a rigid motion of the vertices; of a bend they have it as far as what they carry goes one way. */
+static void a_pose_is_found_from_its_vertices(void **state)
+{
+    npg_mesh *ball = ball_mesh(20, 30);
+    npg_graph *graph;
+    npg_rigid motion = some_motion();
+    double *poses, point[3], worst = 0, most = 0;
+    float *placed;
+    (void)state;
+    open_graph(&graph, &poses, ball, 100);
+    size_t k = graph->node_count, size = k * NPG_POSE_SIZE;
+    assert_int_equal(npg_alloc_array(&placed, NPG_FOR_RUN, ball->vert_count, 3 * sizeof *placed), NPG_OK);
+    for (size_t i = 0; i < 3 * ball->vert_count; i++) {
+        const float *at = ball->vert_pos + i / 3 * 3;
+        placed[i] = (float)motion.translation[i % 3];
+        for (size_t c = 0; c < 3; c++) placed[i] += (float)motion.rotation[i % 3][c] * at[c];
+    }
+    npg_pose_rest(poses, k);
+    npg_pose_move(poses + size, graph, poses, &motion);
+    assert_int_equal(npg_pose_of(poses, graph, ball->vert_pos, placed), NPG_OK);
+    for (size_t i = 0; i < size; i++) assert_true(fabs(poses[i] - poses[size + i]) < 1e-4);
+    for (size_t i = 0; i < 3 * ball->vert_count; i++) /* x goes up with z squared */
+        placed[i] = ball->vert_pos[i] + (i % 3 ? 0 : 0.3f * ball->vert_pos[i + 2] * ball->vert_pos[i + 2]);
+    assert_int_equal(npg_pose_of(poses, graph, ball->vert_pos, placed), NPG_OK);
+    for (size_t v = 0; v < ball->vert_count; v++) {
+        npg_pose_point(point, graph, poses, ball->vert_pos + 3 * v, graph->vert_node + v * NPG_GRAPH_BIND,
+                       graph->vert_weight + v * NPG_GRAPH_BIND);
+        worst = fmax(worst, fabs(point[0] - (double)placed[3 * v]));
+        most = fmax(most, (double)(placed[3 * v] - ball->vert_pos[3 * v]));
+    }
+    print_message("bent by %.4f at most, off by %.4f\n", most, worst);
+    assert_true(worst < 0.2 * most);
+    npg_release(&placed);
+    npg_release(&poses);
+    npg_graph_close(&graph);
+    npg_mesh_unref(&ball);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(extrapolation_goes_on_for_ever),
                                        cmocka_unit_test(a_pose_is_moved_as_a_whole),
+                                       cmocka_unit_test(a_pose_is_found_from_its_vertices),
                                        cmocka_unit_test(a_bend_is_what_no_rigid_motion_explains)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

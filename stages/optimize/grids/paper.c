@@ -11,6 +11,10 @@
 #include "optimize/grids/fit.h"
 #include "track/track.h"
 
+/* As stage align has them. */
+static const npg_tracker_settings tracking = {
+    .nodes = 1600, .samples = 5000, .steps = 12, .stiffness = 0.006, .along = 0.001};
+
 /* Adam's steps keep their length, and what the last one leaves is one draw of many: the result is the state of
  * least loss. */
 typedef struct progress {
@@ -27,6 +31,7 @@ typedef struct paper {
     float *best;  /* T x V x 3: where that state had the frames, owned                         */
     float *poses; /* T x V x 3: where the tracker has them, owned; NULL of a window alone      */
     size_t best_size;
+    npg_follower follower; /* over the reference, unless a window is alone */
     /* of the window at work */
     const npg_problem *problem; /* loan */
     npg_solver_watch *watch;
@@ -39,6 +44,7 @@ static void paper_close(void **slot)
     npg_fit_close(&p->fit);
     npg_release(&p->best);
     npg_release(&p->poses);
+    npg_follower_close(&p->follower);
     npg_release(slot);
 }
 
@@ -72,6 +78,7 @@ static npg_status paper_open(void **out, const npg_solver_setup *setup)
     if (!is_whole(&p->facts->plan)) {
         settings.paper.confidence = NPG_CONFIDENCE_CONSTANT;
         settings.rate_end = NPG_GRIDS_RATE_END;
+        NPG_TRY(npg_follower_open(&p->follower, p->facts->reference, &tracking));
     }
     return npg_fit_open(&p->fit, setup->device, &settings, setup->surface, setup->seed);
 }
@@ -117,10 +124,6 @@ static npg_fit_frame frame_of(const paper *p, size_t t)
 
 /* ---- poses to start from ---- */
 
-/* As stage align has them. */
-static const npg_tracker_settings tracking = {
-    .nodes = 1600, .samples = 5000, .steps = 12, .stiffness = 0.006, .along = 0.001};
-
 /* The keyframe, or what is solved nearest to the new frames. */
 static size_t known_place(const npg_problem *problem, int64_t key)
 {
@@ -131,31 +134,19 @@ static size_t known_place(const npg_problem *problem, int64_t key)
     return at;
 }
 
-/* The reference as it is in that frame. */
-static npg_status surface_at(npg_mesh **surface, const paper *p, size_t known)
-{
-    const npg_mesh *reference = p->facts->reference;
-    const float *solved = p->problem->frames[known].solved;
-    NPG_TRY(npg_mesh_copy(surface, reference));
-    if (!solved) return NPG_OK;
-    memcpy((*surface)->vert_pos, solved, reference->vert_count * 3 * sizeof *solved);
-    npg_mesh_vertex_normals((*surface)->vert_normals, solved, reference->vert_count, reference->faces,
-                            reference->face_count);
-    return NPG_OK;
-}
-
 /* Outward on both sides as far as nothing is solved; what has no points stays as the frame before it. */
-static npg_status follow(paper *p, npg_follower *follower, size_t known)
+static npg_status follow(paper *p, size_t known)
 {
     const npg_solver_frame *frames = p->problem->frames;
     size_t size = 3 * p->facts->reference->vert_count;
     for (int step = -1; step <= 1; step += 2) {
-        npg_follower_rest(follower);
+        npg_follower_rest(&p->follower);
+        if (frames[known].solved) NPG_TRY(npg_follower_start(&p->follower, frames[known].solved));
         for (size_t t = known + (size_t)step; t < p->problem->count && !frames[t].solved; t += (size_t)step) {
             const npg_tracker_cloud cloud = {
                 .points = frames[t].points, .normals = frames[t].normals, .count = frames[t].point_count};
-            if (cloud.count) NPG_TRY(npg_follower_go(follower, &cloud));
-            npg_follower_vertices(follower, p->poses + t * size);
+            if (cloud.count) NPG_TRY(npg_follower_go(&p->follower, &cloud));
+            npg_follower_vertices(&p->follower, p->poses + t * size);
         }
     }
     return NPG_OK;
@@ -163,21 +154,15 @@ static npg_status follow(paper *p, npg_follower *follower, size_t known)
 
 static npg_status find_poses(paper *p)
 {
-    npg_follower follower = {0};
-    npg_mesh *surface = NULL;
-    size_t known = known_place(p->problem, p->facts->plan.key), size = 3 * p->facts->reference->vert_count;
+    const npg_mesh *reference = p->facts->reference;
+    size_t known = known_place(p->problem, p->facts->plan.key), size = 3 * reference->vert_count;
     npg_release(&p->poses);
     NPG_TRY(npg_alloc_array(&p->poses, NPG_FOR_FIT, p->problem->count * size, sizeof *p->poses));
-    npg_status status = surface_at(&surface, p, known);
-    for (size_t t = 0; t < p->problem->count && !status; t++) {
+    for (size_t t = 0; t < p->problem->count; t++) {
         const float *solved = p->problem->frames[t].solved;
-        memcpy(p->poses + t * size, solved ? solved : surface->vert_pos, size * sizeof *solved);
+        memcpy(p->poses + t * size, solved ? solved : reference->vert_pos, size * sizeof *solved);
     }
-    if (!status) status = npg_follower_open(&follower, surface, &tracking);
-    if (!status) status = follow(p, &follower, known);
-    npg_follower_close(&follower);
-    npg_mesh_unref(&surface);
-    return status;
+    return follow(p, known);
 }
 
 /* ---- a window ---- */
