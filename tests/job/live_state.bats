@@ -114,7 +114,7 @@ check_killed() {
 }
 
 @test "without alignment it is killed inside a window" {
-    local free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 4000}')
+    local free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 16000}')
     rm -rf left killed
     "$NEUPIG" run --follow all -o left "${small[@]}" "${open[@]}" "${free[@]}" >left.log
     for place in 1 2; do
