@@ -32,18 +32,24 @@ void npg_pose_extrapolate(double *next, const double *now, const double *before,
     }
 }
 
+static void move_node(double moved[NPG_POSE_SIZE], const float node[3], const double pose[NPG_POSE_SIZE],
+                      const npg_rigid *motion)
+{
+    for (int row = 0; row < 3; row++) {
+        const double *r = motion->rotation[row];
+        double x = motion->translation[row];
+        for (int c = 0; c < 3; c++) {
+            x += r[c] * ((double)node[c] + pose[9 + c]);
+            moved[3 * row + c] = r[0] * pose[c] + r[1] * pose[3 + c] + r[2] * pose[6 + c];
+        }
+        moved[9 + row] = x - (double)node[row];
+    }
+}
+
 void npg_pose_move(double *moved, const npg_graph *graph, const double *pose, const npg_rigid *motion)
 {
-    for (size_t k = 0; k < graph->node_count; k++, moved += NPG_POSE_SIZE, pose += NPG_POSE_SIZE)
-        for (int row = 0; row < 3; row++) {
-            const double *r = motion->rotation[row];
-            double x = motion->translation[row];
-            for (int c = 0; c < 3; c++) {
-                x += r[c] * ((double)graph->node_pos[3 * k + (size_t)c] + pose[9 + c]);
-                moved[3 * row + c] = r[0] * pose[c] + r[1] * pose[3 + c] + r[2] * pose[6 + c];
-            }
-            moved[9 + row] = x - (double)graph->node_pos[3 * k + (size_t)row];
-        }
+    for (size_t k = 0; k < graph->node_count; k++)
+        move_node(moved + k * NPG_POSE_SIZE, graph->node_pos + 3 * k, pose + k * NPG_POSE_SIZE, motion);
 }
 
 void npg_pose_places(float *places, const npg_graph *graph, const double *pose)
@@ -81,8 +87,7 @@ npg_status npg_pose_bend(double *bend, const npg_graph *graph, const double *pos
     return NPG_OK;
 }
 
-/* The vertices that node k carries are of[first[k]] .. of[first[k + 1] - 1]; first (K + 1) and next (K) are zero
- * before. */
+/* Node k carries the vertices of[first[k]] .. of[first[k + 1] - 1]; first (K + 1), next (K): zero before. */
 static void list_by_node(size_t *first, size_t *next, uint32_t *of, const npg_graph *graph)
 {
     size_t count = graph->vert_count * NPG_GRAPH_BIND;
@@ -97,6 +102,7 @@ static void list_by_node(size_t *first, size_t *next, uint32_t *of, const npg_gr
 npg_status npg_pose_of(double *pose, const npg_graph *graph, const float *rest, const float *placed)
 {
     npg_arena scratch = {.purpose = NPG_FOR_FIT};
+    const double rest_pose[NPG_POSE_SIZE] = {[0] = 1, [4] = 1, [8] = 1};
     size_t count = graph->vert_count * NPG_GRAPH_BIND;
     size_t *first = npg_arena_take(&scratch, graph->node_count + 1, sizeof *first);
     size_t *next = npg_arena_take(&scratch, graph->node_count, sizeof *next);
@@ -106,19 +112,14 @@ npg_status npg_pose_of(double *pose, const npg_graph *graph, const float *rest, 
     npg_status status = npg_arena_status(&scratch);
     if (!status) list_by_node(first, next, of, graph);
     npg_pose_rest(pose, graph->node_count);
-    for (size_t k = 0; k < graph->node_count && !status; k++, pose += NPG_POSE_SIZE) {
-        double rotation[3][3], translation[3];
+    for (size_t k = 0; k < graph->node_count && !status; k++) {
+        npg_rigid motion;
         size_t verts = first[k + 1] - first[k];
         if (!verts) continue;
         npg_rows_gather(from, rest, of + first[k], verts);
         npg_rows_gather(to, placed, of + first[k], verts);
-        npg_rigid_fit(rotation, translation, from, to, verts);
-        for (size_t i = 0; i < 9; i++) pose[i] = rotation[i / 3][i % 3];
-        for (size_t row = 0; row < 3; row++) {
-            pose[9 + row] = translation[row] - (double)graph->node_pos[3 * k + row];
-            for (size_t c = 0; c < 3; c++)
-                pose[9 + row] += rotation[row][c] * (double)graph->node_pos[3 * k + c];
-        }
+        npg_rigid_fit(motion.rotation, motion.translation, from, to, verts);
+        move_node(pose + k * NPG_POSE_SIZE, graph->node_pos + 3 * k, rest_pose, &motion);
     }
     npg_arena_release(&scratch);
     return status;

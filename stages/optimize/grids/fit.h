@@ -32,8 +32,7 @@ typedef struct npg_fit_frame {
     const float *points; /* N x 3, unit, finite; a loan during npg_fit_begin          */
     size_t count;        /* N; 0: no points, the frame follows from the others        */
     const float *tie;    /* V x 3: known positions, or NULL; a loan likewise          */
-    const float *base;   /* V x 3: what the field turns and moves there; a loan likewise; NULL in all
-                          * frames of a window: the reference                          */
+    const float *base;   /* V x 3: what the field moves there; a loan; NULL in all frames: the reference */
 } npg_fit_frame;
 
 typedef struct npg_fit npg_fit;
