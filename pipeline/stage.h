@@ -72,6 +72,7 @@ typedef struct npg_brief {
     bool compares;   /* a choosing pass compares candidates first: another may do better than the key tried */
     int64_t key;     /* index of the keyframe; negative: as planned */
     bool is_attempt; /* ... of which it is to be seen whether it does better than the one before */
+    bool keeps_gathered; /* what the pass that ended has gathered is kept; else what the one before had */
     bool takes_gathered; /* the next reference is made from what was gathered ...   */
     bool takes_poses;    /* ... and the poses found are good to start from; else frames are followed anew */
     int64_t gathers_from, gathers_to; /* index of the first and last frame whose points are gathered */
@@ -107,7 +108,7 @@ typedef struct npg_facts {
     int64_t window_asked, overlap_asked; /* as the options say; the plan's fit the capture                  */
     npg_choice choice;                   /* what the choosing pass should look at                           */
     size_t own_verts;                    /* vertices of the user's own mesh; 0: the reference is to be made */
-    /* fuse */
+    /* reference */
     npg_brief brief;         /* between passes */
     size_t sensor_count_max; /* of all frames; 0: where sensors stood is not known */
     size_t view_count_max;   /* those of them whose images are known               */

@@ -23,9 +23,9 @@ static const char *owner_of(size_t offset)
         size_t end;
         const char *name;
     } owners[] = {
-        {offsetof(npg_facts, point_count_max), "ingest"}, {offsetof(npg_facts, brief), "keyframe"},
-        {offsetof(npg_facts, unreached_count), "fuse"},   {offsetof(npg_facts, reference), "align"},
-        {offsetof(npg_facts, has_changed), "mesh"},       {offsetof(npg_facts, is_resumed), "evaluate"}};
+        {offsetof(npg_facts, point_count_max), "ingest"},    {offsetof(npg_facts, brief), "keyframe"},
+        {offsetof(npg_facts, unreached_count), "reference"}, {offsetof(npg_facts, reference), "align"},
+        {offsetof(npg_facts, has_changed), "mesh"},          {offsetof(npg_facts, is_resumed), "evaluate"}};
     for (size_t i = 0; i < sizeof owners / sizeof *owners; i++)
         if (offset < owners[i].end) return owners[i].name;
     return "job";

@@ -3,19 +3,21 @@
 #include "pipeline/stage.h"
 
 extern const npg_stage npg_stage_ingest, npg_stage_outlier, npg_stage_keyframe, npg_stage_mesh,
-    npg_stage_align, npg_stage_fuse, npg_stage_optimize, npg_stage_evaluate, npg_stage_export, npg_stage_job;
+    npg_stage_align, npg_stage_fuse, npg_stage_reference, npg_stage_optimize, npg_stage_evaluate,
+    npg_stage_export, npg_stage_job;
 
 const npg_stage *const npg_chain[] = {
-    &npg_stage_job,      /* resumes what an earlier run of the same job left     */
-    &npg_stage_ingest,   /* files, a stream or pushed frames -> chunks of points */
-    &npg_stage_outlier,  /* drops what is no surface, makes or mends normals     */
-    &npg_stage_keyframe, /* box, keyframe, plan of the windows                   */
-    &npg_stage_mesh,     /* the reference surface of the keyframe                */
-    &npg_stage_align,    /* the reference brought coarsely into each frame       */
-    &npg_stage_fuse,     /* the points of all frames, for a better reference     */
-    &npg_stage_optimize, /* its deformation in every frame                       */
-    &npg_stage_evaluate, /* figures and a verdict per frame                      */
-    &npg_stage_export,   /* meshes, report, done.json                            */
+    &npg_stage_job,       /* resumes what an earlier run of the same job left     */
+    &npg_stage_ingest,    /* files, a stream or pushed frames -> chunks of points */
+    &npg_stage_outlier,   /* drops what is no surface, makes or mends normals     */
+    &npg_stage_keyframe,  /* box, keyframe, plan of the windows                   */
+    &npg_stage_mesh,      /* the reference surface of the keyframe                */
+    &npg_stage_align,     /* the reference brought coarsely into each frame       */
+    &npg_stage_fuse,      /* the points of all frames, for a better reference     */
+    &npg_stage_reference, /* which keyframe, how many passes: decided between them */
+    &npg_stage_optimize,  /* its deformation in every frame                       */
+    &npg_stage_evaluate,  /* figures and a verdict per frame                      */
+    &npg_stage_export,    /* meshes, report, done.json                            */
     NULL};
 
 /* clang-format off */

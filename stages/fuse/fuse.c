@@ -21,11 +21,7 @@
 #include "geometry/limits.h"
 #include "mesh/surface.h"
 #include "pipeline/cost.h"
-#include "pipeline/options.h"
 #include "pipeline/order.h"
-#include "reference/loop.h"
-#include "reference/reference.h"
-#include "track/track.h"
 
 #define SIDE_LEAST   0.25 /* of a cell, in spacings of the keyframe's points */
 #define FRAMES_SHARE 0.05 /* of all frames must have seen a place: wrong motion shows others in a few */
@@ -43,13 +39,7 @@
 #define GROW_WEIGHT    0.25 /* of such a point, one on the surface being 1                       */
 #define DENSE_SPACINGS 1.5  /* of the keyframe's points, within which a place must have NPG_PATCH */
 
-enum { FROM_KEY, FROM_ALL };
-
 typedef struct state {
-    int from;                 /* option */
-    int64_t rounds, attempts; /* options */
-    int64_t usable; /* frames with points, and most sensors and images of one: of the measuring pass */
-    size_t sensors, views;
     npg_skin *skin;
     npg_cells *cells;
     npg_carving *empty;        /* NULL: it is not known where sensors stood */
@@ -58,25 +48,8 @@ typedef struct state {
     double spacing, noise;     /* of the keyframe's points */
     double usual;              /* mean of the frames' median distances */
     int64_t frames, misaligned, points, strays;
-    npg_judging *judging; /* of the keyframe that is tried; NULL: it stays in any case */
     double grow_dist; /* of an open reference that sensors saw: so near its border points add to it; else 0 */
 } state;
-
-#define AT(member) offsetof(state, member)
-
-/* clang-format off */
-static const npg_option options[] = {
-    /* type         name                place       default least most  shown as or words */
-    NPG_KEY(CHOICE, "reference-from",   AT(from),   "all", "key|all",
-        "What the reference is made from: the keyframe's points alone, "
-        "or those of all frames (of a live source those of the look-ahead), brought to its pose"),
-    NPG_KEY(INT,    "reference-rounds", AT(rounds), "1",   1, 20, "N",
-        "Times that the points of all frames are gathered with the reference so far"),
-    NPG_KEY(INT,    "attempts",         AT(attempts), "1", 0, NPG_ATTEMPTS_MOST, "N",
-        "Other keyframes that are tried where frames are below the bar with the one chosen; "
-        "the one with the fewest such frames is kept"),
-    {0}};
-/* clang-format on */
 
 /* ---- a frame ---- */
 
@@ -200,23 +173,6 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key)
     return NPG_OK;
 }
 
-/* How the reference of a keyframe that is tried fares in a frame of the sample, its own first. */
-static npg_status judge(npg_worker *worker, int64_t index, const float *vert_unit)
-{
-    state *s = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
-    npg_judge_settings settings = {0};
-    size_t at = clouds ? npg_candidate_clouds_find(clouds, index) : 0;
-    if (!facts->choice.is_tried || !clouds || at == clouds->count) return NPG_OK;
-    const npg_candidate_cloud *seen = &clouds->list[at];
-    if (index == facts->plan.key) {
-        NPG_TRY(npg_cloud_spacing(&settings.spacing_unit, seen->points, seen->point_count));
-        NPG_TRY(npg_judging_open(&s->judging, clouds, at, facts->reference, &settings));
-    }
-    return s->judging ? npg_judging_see(s->judging, seen, vert_unit) : NPG_OK;
-}
-
 static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
@@ -224,7 +180,6 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     NPG_TRY(open_cloud(c, worker, frame));
     if (!s->skin) NPG_TRY(open_gathering(worker, c));
     if (c->colours && !s->colours) NPG_TRY(npg_colour_cells_open(&s->colours, s->spacing, COLOURS_MOST));
-    NPG_TRY(judge(worker, frame->index, frame->vert_unit));
     npg_skin_pose(s->skin, frame->vert_unit);
     NPG_TRY(npg_skin_to_rest(s->skin, c->warped, c->points, c->normals, c->count));
     NPG_TRY(median_dist(&median, c, s->grow_dist > 0));
@@ -312,13 +267,12 @@ static npg_status collect_empty(const state *s, npg_fused *fused)
 static void report_gathered(npg_worker *worker, const npg_fused *fused)
 {
     const state *s = npg_worker_state(worker);
-    const npg_reference_loop *loop = npg_worker_kept(worker);
     json_t *report = npg_worker_report(worker);
-    json_object_update_new(report, json_pack("{sI sI sI sI sI sI sf}", "frames", (json_int_t)s->frames,
-                                             "frames_misaligned", (json_int_t)s->misaligned, "passes_grown",
-                                             (json_int_t)loop->grown, "points", (json_int_t)s->points,
-                                             "points_stray", (json_int_t)s->strays, "points_fused",
-                                             (json_int_t)fused->count, "cell_unit", fused->spacing_unit));
+    json_object_update_new(report, json_pack("{sI sI sI sI sI sf}", "frames", (json_int_t)s->frames,
+                                             "frames_misaligned", (json_int_t)s->misaligned, "points",
+                                             (json_int_t)s->points, "points_stray", (json_int_t)s->strays,
+                                             "points_fused", (json_int_t)fused->count, "cell_unit",
+                                             fused->spacing_unit));
     if (fused->empty)
         json_object_set_new(report, "cells_seen_empty", json_integer((json_int_t)fused->empty_count));
     npg_worker_log(worker, NPG_LOG_INFO, -1,
@@ -347,147 +301,18 @@ static npg_status publish(npg_worker *worker)
 
 static npg_status process(npg_worker *worker, npg_chunk **chunk)
 {
-    state *s = npg_worker_state(worker);
     for (size_t i = 0; i < npg_chunk_count(*chunk); i++) {
-        const npg_frame *frame = npg_chunk_frame(*chunk, i);
-        if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
-            s->usable += !frame->is_skipped;
-            if (frame->sensor_count > s->sensors) s->sensors = frame->sensor_count;
-            if (frame->views && frame->sensor_count > s->views) s->views = frame->sensor_count;
-        } else if (npg_worker_pass(worker) == NPG_PASS_FUSE) {
-            NPG_TRY(gather_frame(worker, frame));
-        }
+        NPG_TRY(gather_frame(worker, npg_chunk_frame(*chunk, i)));
         if (npg_worker_stopping(worker)) return NPG_STOPPED;
     }
     return NPG_OK;
 }
 
-static void release_loop(void *thing)
-{
-    npg_reference_loop *loop = thing;
-    npg_release(&loop);
-}
-
-static npg_status begin(npg_worker *worker)
-{
-    const state *s = npg_worker_state(worker);
-    npg_reference_loop *loop;
-    NPG_TRY(npg_alloc(&loop, NPG_FOR_MESH, sizeof *loop));
-    npg_worker_keep(worker, loop, release_loop);
-    *npg_own(worker, brief) = npg_reference_begin(loop, s->usable > 1 ? s->rounds : 0);
-    *npg_own(worker, sensor_count_max) = s->sensors;
-    *npg_own(worker, view_count_max) = s->views;
-    return NPG_OK;
-}
-
-/* Whether another keyframe could do better than the one that is tried: parts that touch in it are joined, or points
- * are farther from its surface than their own would be. */
-static npg_status is_beatable(bool *beatable, npg_worker *worker)
-{
-    const state *s = npg_worker_state(worker);
-    int64_t handles;
-    *beatable = false;
-    if (!s->judging) return NPG_OK;
-    const npg_judgement *found = npg_judging_found(s->judging);
-    NPG_TRY(npg_mesh_handles(&handles, npg_worker_facts(worker)->reference));
-    *beatable = handles > 0 || !npg_judged_least(found);
-    json_object_update_new(npg_worker_report(worker),
-                           json_pack("{sf sf}", "judged", found->mean, "judged_own", found->own));
-    return NPG_OK;
-}
-
-static npg_pass_result result_of(const npg_worker *worker)
-{
-    const state *s = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    int64_t last = facts->planned_count - 1;
-    npg_pass_result result = {.key = facts->plan.key,
-                              .unreached_count = facts->unreached_count,
-                              .has_changed = facts->has_changed[0] || facts->has_changed[1],
-                              .explained_from = facts->has_changed[1] ? facts->changed_at[1] + 1 : 0,
-                              .explained_to = facts->has_changed[0] ? facts->changed_at[0] - 1 : last,
-                              .is_side = s->grow_dist > 0,
-                              .has_images = facts->view_count_max > 0};
-    result.bad_count = facts->unfit_count + last - result.explained_to + result.explained_from;
-    return result;
-}
-
-/* What each keyframe came to, where more than one was tried. */
-static void report_attempts(npg_worker *worker, const npg_reference_loop *loop)
-{
-    const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
-    json_t *list = json_array();
-    for (size_t i = 0; i < loop->tried_count; i++) {
-        const npg_pass_result *one = &loop->tried[i];
-        size_t at = npg_candidate_clouds_find(clouds, one->key);
-        json_array_append_new(list, json_pack("{sI sI sb}", "keyframe", (json_int_t)clouds->list[at].number,
-                                              "frames_bad", (json_int_t)one->bad_count, "kept",
-                                              loop->is_settled && i == loop->kept));
-    }
-    json_object_set_new(npg_worker_report(worker), "attempts", list);
-    npg_worker_log(worker, NPG_LOG_INFO, -1, "with this keyframe %lld frames are below the bar: %s",
-                   (long long)loop->tried[loop->tried_count - 1].bad_count,
-                   !loop->is_settled                ? "another is tried"
-                   : npg_reference_keeps_last(loop) ? "it is kept"
-                                                    : "the one before is taken back");
-}
-
-static void tell(npg_worker *worker, const npg_reference_loop *loop, const npg_pass_result *result,
-                 bool was_open)
-{
-    const npg_brief *brief = &loop->brief;
-    if (was_open && (brief->is_attempt || loop->tried_count > 1)) report_attempts(worker, loop);
-    if (!brief->is_attempt && !brief->takes_gathered)
-        npg_worker_log(worker, NPG_LOG_INFO, -1,
-                       "the keyframe's surface does not explain all frames: what others show is left out");
-    if (result->unreached_count)
-        npg_worker_log(worker, NPG_LOG_INFO, -1,
-                       "%lld frames see too much that the reference does not have yet%s",
-                       (long long)result->unreached_count,
-                       brief->leaves_open ? ": it grows, and they are followed again" : "");
-}
-
-static void offer(const npg_worker *worker, npg_reference_loop *loop)
-{
-    const state *s = npg_worker_state(worker);
-    const npg_choice *choice = &npg_worker_facts(worker)->choice;
-    size_t most = (size_t)s->attempts;
-    npg_reference_offer(loop, choice->ranked, choice->ranked_count < most ? choice->ranked_count : most);
-}
-
-/* The keyframe's surface is there, or candidates were compared. */
-static npg_status settle_choice(npg_worker *worker, npg_reference_loop *loop)
-{
-    const npg_facts *facts = npg_worker_facts(worker);
-    bool beatable, was_open = !loop->is_settled;
-    if (loop->brief.compares) {
-        offer(worker, loop);
-        *npg_own(worker, brief) = npg_reference_compared(loop, facts->plan.key);
-        if (loop->tried_count) tell(worker, loop, &loop->trial, was_open);
-        return NPG_OK;
-    }
-    if (facts->reference) NPG_TRY(judge(worker, facts->plan.key, facts->reference->vert_pos));
-    NPG_TRY(is_beatable(&beatable, worker));
-    if (beatable) *npg_own(worker, brief) = npg_reference_doubt(loop);
-    return NPG_OK;
-}
-
-/* The pass's points are gathered as what comes next needs them; what was gathered for a keyframe that does better
- * stays. */
+/* What was gathered for a keyframe that does better stays. */
 static npg_status settle(npg_worker *worker)
 {
-    npg_reference_loop *loop = npg_worker_kept(worker);
-    if (npg_worker_pass(worker) == NPG_PASS_MEASURE) return begin(worker);
-    if (npg_worker_pass(worker) == NPG_PASS_CHOOSE) return settle_choice(worker, loop);
     npg_fused *before = npg_worker_take_fact(worker, &npg_fact_fused);
-    bool was_open = !loop->is_settled;
-    if (!loop->tried_count) offer(worker, loop);
-    npg_pass_result result = result_of(worker);
-    NPG_TRY(is_beatable(&result.is_beatable, worker));
-    result.is_beatable |= result.bad_count && npg_worker_facts(worker)->choice.is_tried;
-    *npg_own(worker, brief) = npg_reference_next(loop, &result);
-    if (loop->tried_count) tell(worker, loop, &result, was_open);
-    if (before && was_open && !npg_reference_keeps_last(loop))
+    if (before && !npg_worker_facts(worker)->brief.keeps_gathered)
         return npg_worker_publish(worker, &npg_fact_fused, before);
     npg_fused_close(&before);
     return publish(worker);
@@ -497,18 +322,9 @@ static void uninit(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     npg_skin_close(&s->skin);
-    npg_judging_close(&s->judging);
     npg_cells_close(&s->cells);
     npg_carving_close(&s->empty);
     npg_colour_cells_close(&s->colours);
-}
-
-/* Without alignment nothing is known to carry points by. */
-static bool takes_part(const npg_worker *worker)
-{
-    const state *s = npg_worker_state(worker);
-    return s->from == FROM_ALL && !npg_worker_settings(worker)->reference[0] &&
-           npg_worker_has_field(worker, NPG_FIELD_POSE);
 }
 
 static size_t memory(const npg_worker *worker, size_t *chunks_held)
@@ -526,11 +342,9 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 
 const npg_stage npg_stage_fuse = {.name = "fuse",
                                   .help = "gathers the points of all frames for the reference",
-                                  .options = options,
                                   .state_size = sizeof(state),
-                                  .passes = NPG_PASS_MEASURE | NPG_PASS_CHOOSE | NPG_PASS_FUSE,
+                                  .passes = NPG_PASS_FUSE,
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY | NPG_FIELD_REFERENCE,
-                                  .takes_part = takes_part,
                                   .process = process,
                                   .settle = settle,
                                   .uninit = uninit,

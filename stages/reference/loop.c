@@ -15,6 +15,7 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
     *loop = (npg_reference_loop){.brief = {.rounds_left = rounds,
                                            .key = -1,
                                            .takes_gathered = true,
+                                           .keeps_gathered = true,
                                            .takes_poses = true,
                                            .gathers_from = INT64_MIN,
                                            .gathers_to = INT64_MAX,
@@ -44,9 +45,10 @@ void npg_reference_offer(npg_reference_loop *loop, const int64_t *keys, size_t c
         loop->others[loop->other_count++] = keys[i];
 }
 
-bool npg_reference_keeps_last(const npg_reference_loop *loop)
+/* Whether the keyframe of the pass that ended last is the best so far. */
+static bool keeps_last(const npg_reference_loop *loop)
 {
-    return !loop->tried_count || loop->kept == loop->tried_count - 1;
+    return loop->kept == loop->tried_count - 1;
 }
 
 /* Whether another keyframe is to be followed before anything is made of the pass that ended.  A side of the body
@@ -62,6 +64,7 @@ static bool tries_another(npg_reference_loop *loop, const npg_pass_result *resul
     if (is_open || !loop->tried[loop->kept].bad_count || at == loop->other_count) return false;
     brief->key = loop->others[at];
     brief->is_attempt = true;
+    brief->keeps_gathered = keeps_last(loop);
     brief->takes_gathered = brief->takes_poses = false;
     return true;
 }
@@ -73,7 +76,7 @@ static const npg_pass_result *settle_key(npg_reference_loop *loop)
     loop->is_settled = true;
     loop->brief.key = kept->key;
     loop->brief.is_attempt = false;
-    loop->brief.takes_poses = npg_reference_keeps_last(loop);
+    loop->brief.takes_poses = loop->brief.keeps_gathered = keeps_last(loop);
     return kept;
 }
 
@@ -87,7 +90,7 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
         brief->compares = true;
         return *brief;
     }
-    brief->takes_poses = true;
+    brief->takes_poses = brief->keeps_gathered = true;
     if (tries_another(loop, result)) return *brief;
     if (!loop->is_settled) result = settle_key(loop);
     /* What a side has taken from past its border was not followed yet: what other frames see through shows then. */

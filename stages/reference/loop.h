@@ -50,10 +50,6 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds);
  * ended; they replace those of before. */
 void npg_reference_offer(npg_reference_loop *loop, const int64_t *keys, size_t count);
 
-/* Whether the keyframe of the pass that ended last is the best so far: what was gathered for it is kept, and what
- * was for the one before is not.  To be asked after npg_reference_next(). */
-bool npg_reference_keeps_last(const npg_reference_loop *loop);
-
 /* The brief of the next one.  Parts that come, go or open belong to no common surface, and hiding them in one would
  * silence the alarm: where the reference does not explain all frames, those that it explains are followed once
  * more and gathered alone, if there are three.  A side of the body grows until all frames are reached, or two passes in a row

@@ -179,7 +179,7 @@ static void a_keyframe_that_fails_gives_way_to_a_better_one(void **state)
     brief = next_of(&loop, 3, 0); /* all is well: the other one is not tried */
     assert_int_equal(brief.key, 3);
     assert_false(brief.is_attempt);
-    assert_true(brief.takes_gathered && brief.takes_poses && npg_reference_keeps_last(&loop));
+    assert_true(brief.takes_gathered && brief.takes_poses && loop.brief.keeps_gathered);
     assert_int_equal(brief.rounds_left, 0);
 }
 
@@ -240,10 +240,10 @@ static void a_keyframe_that_does_no_better_is_taken_back(void **state)
     next_of(&loop, 5, 4);
     npg_brief brief = next_of(&loop, 3, 9);
     assert_int_equal(brief.key, 7);
-    assert_false(npg_reference_keeps_last(&loop));
+    assert_false(loop.brief.keeps_gathered);
     brief = next_of(&loop, 7, 4); /* no better is not enough */
     assert_int_equal(brief.key, 5);
-    assert_false(brief.is_attempt || brief.takes_poses || npg_reference_keeps_last(&loop));
+    assert_false(brief.is_attempt || brief.takes_poses || loop.brief.keeps_gathered);
     assert_true(brief.takes_gathered);
     assert_int_equal(brief.rounds_left, 1); /* as without any attempt */
     brief = next_of(&loop, 5, 4);           /* and it is not in question again */
