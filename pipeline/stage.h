@@ -50,8 +50,7 @@ typedef struct npg_choice {
     size_t count, candidate_count; /* count 0: there is no choosing pass */
     int64_t frames[NPG_CHOICE_FRAMES];
     bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
-    int64_t ranked[NPG_CHOICE_MAX];       /* keyframes to try where the one chosen fails, the best first */
-    size_t ranked_count;
+    bool is_open;  /* the user has named no keyframe: where it fails, another of these frames may be tried */
     bool is_tried; /* the key alone is read: others are compared if its pass says that one could do better */
 } npg_choice;
 
@@ -123,7 +122,8 @@ typedef struct npg_facts {
     /* evaluate, at the end of a fusing pass and of the solving one; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */
-    int64_t unfit_count;   /* of a fusing pass: frames below the bar by themselves */
+    int64_t unfit_count;   /* of a fusing pass: frames below the bar by themselves ...   */
+    int64_t unfit_worst;   /* ... and the index of the one that is farthest below it     */
     /* job, before the first pass */
     bool is_resumed;       /* all facts above are known; only the solving pass is walked */
     int64_t resumed_read;  /* frames of the plan that need not be read again             */

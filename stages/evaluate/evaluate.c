@@ -37,8 +37,8 @@ typedef struct evaluate_state {
     npg_measure *measure; /* opened for the first frame that has a mesh */
     npg_verdict verdict;
     aggregate sums[NPG_FIGURE_ROWS];
-    int64_t *bad;        /* numbers of the frames below the bar; owned */
-    int64_t unfit_count; /* of a fusing pass */
+    int64_t *bad;                     /* numbers of the frames below the bar; owned */
+    int64_t unfit_count, unfit_worst; /* of a fusing pass */
     size_t bad_count, bad_capacity, good_count, skipped_count;
     fault worst; /* of the bad ones, by how often it is the bar */
     int64_t worst_number;
@@ -259,13 +259,19 @@ static void note_unfit(npg_worker *worker, const npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
     if (frame->is_shared || frame->is_skipped || isnan(frame->figures.coverage)) return;
-    state->unfit_count += fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share).kind != 0;
+    fault found = fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share);
+    if (!found.kind) return;
+    if (!state->unfit_count++ || times_of(&found) > times_of(&state->worst)) {
+        state->worst = found;
+        state->unfit_worst = frame->index;
+    }
 }
 
 static npg_status end_fusing(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
     *npg_own(worker, unfit_count) = state->unfit_count;
+    *npg_own(worker, unfit_worst) = state->unfit_worst;
     return npg_topology_finish(&state->watch, worker);
 }
 

@@ -2,8 +2,6 @@
 #include "keyframe/keyframe_internal.h"
 
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
@@ -23,7 +21,7 @@ void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, b
     if (stride > STRIDE_MOST) stride = STRIDE_MOST;
     int64_t side = NPG_CHOICE_FRAMES / 2 * stride, first = key % stride;
     if (key - side > first) first = key - side;
-    *choice = (npg_choice){0};
+    *choice = (npg_choice){.is_open = choice->is_open};
     for (int64_t i = first; i < frame_count && choice->count < NPG_CHOICE_FRAMES; i += stride) {
         choice->is_candidate[choice->count] = i == key;
         choice->frames[choice->count++] = i;
@@ -134,36 +132,6 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
     return status;
 }
 
-/* ---- those that are left ---- */
-
-static int by_figure(const void *left, const void *right)
-{
-    const npg_candidate *a = left, *b = right;
-    return (a->judgement.mean > b->judgement.mean) - (a->judgement.mean < b->judgement.mean);
-}
-
-/* Those that could be followed, the best first. */
-static void rank_candidates(npg_choice *choice, const npg_candidate *list, size_t count, int64_t key)
-{
-    npg_candidate sorted[NPG_CHOICE_MAX];
-    choice->ranked_count = 0;
-    memcpy(sorted, list, count * sizeof *sorted);
-    qsort(sorted, count, sizeof *sorted, by_figure);
-    for (size_t i = 0; i < count; i++)
-        if (sorted[i].is_followed && sorted[i].index != key)
-            choice->ranked[choice->ranked_count++] = sorted[i].index;
-}
-
-/* Where none was compared: spread evenly over the sample. */
-static void spread_candidates(npg_choice *choice, const npg_candidate_clouds *clouds, int64_t key)
-{
-    size_t count = clouds->count < NPG_CHOICE_MAX ? clouds->count : NPG_CHOICE_MAX;
-    for (size_t i = 0; i < count; i++) {
-        int64_t index = clouds->list[(2 * i + 1) * clouds->count / (2 * count)].index;
-        if (index != key) choice->ranked[choice->ranked_count++] = index;
-    }
-}
-
 /* ---- the pass ---- */
 
 npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, npg_chunk *chunk)
@@ -203,23 +171,18 @@ static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_c
     NPG_TRY(npg_candidates_try(list, &count, &best, clouds, facts->plan.key, &settings));
     if (!count) return NPG_OK;
     *chosen = list[best];
-    rank_candidates(npg_own(worker, choice), list, count, chosen->index);
     report_candidates(worker, list, count, npg_clock_s() - since);
     npg_worker_log(worker, NPG_LOG_INFO, chosen->number, "is the keyframe, of %zu candidates (judged %.3f)",
                    count, chosen->judgement.mean);
     return NPG_OK;
 }
 
-npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, bool is_open, npg_candidate *chosen)
+npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, npg_candidate *chosen)
 {
-    const npg_choice *choice = &npg_worker_facts(worker)->choice;
     npg_candidate_clouds *clouds = pass->clouds;
     *chosen = (npg_candidate){.index = -1};
     if (!clouds || !clouds->count) return NPG_OK;
-    if (choice->candidate_count > 1)
-        NPG_TRY(compare(worker, chosen, clouds));
-    else if (is_open)
-        spread_candidates(npg_own(worker, choice), clouds, npg_worker_facts(worker)->plan.key);
+    if (npg_worker_facts(worker)->choice.candidate_count > 1) NPG_TRY(compare(worker, chosen, clouds));
     pass->clouds = NULL; /* the run's, from here on */
     npg_candidate_clouds *before = npg_worker_take_fact(worker, &npg_fact_candidate_clouds);
     npg_candidate_clouds_close(&before);

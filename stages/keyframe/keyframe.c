@@ -296,6 +296,7 @@ static void set_choice(npg_worker *worker)
     bool chooses = has_candidates(worker) && !goes_by_area(worker);
     npg_choice *choice = npg_own(worker, choice);
     if (facts->planned_count < 2 || *own_mesh(worker) || state->choice == CHOICE_PAPER) return;
+    choice->is_open = has_candidates(worker);
     npg_candidates_list(choice, facts->plan.key, facts->planned_count, true);
     /* A pass that follows one side of the body says little of what other frames see, and a sample little of all. */
     bool is_tried = chooses && facts->brief.rounds_left && !facts->sensor_count_max &&
@@ -348,7 +349,7 @@ static npg_status close_choosing(npg_worker *worker)
     const npg_facts *facts = npg_worker_facts(worker);
     json_t *report = npg_worker_report(worker), *by_score = json_object_get(report, "key");
     npg_candidate chosen;
-    NPG_TRY(npg_choose_pass_end(&state->choosing, worker, has_candidates(worker), &chosen));
+    NPG_TRY(npg_choose_pass_end(&state->choosing, worker, &chosen));
     if (chosen.index < 0 || chosen.index == facts->plan.key) return NPG_OK;
     json_object_set(report, "key_by_score", by_score);
     npg_own(worker, plan)->key = chosen.index;

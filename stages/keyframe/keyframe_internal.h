@@ -113,12 +113,10 @@ typedef struct npg_choose_pass {
 /* Remember what the frames of a chunk show.  NPG_MEMORY. */
 npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, npg_chunk *chunk);
 
-/* The end of the pass: *chosen gets the candidate to take, chosen->index -1 where the frame by score stays; is_open:
- * the user has named none, so others may be tried (facts.choice.ranked).
+/* The end of the pass: *chosen gets the candidate to take, chosen->index -1 where the frame by score stays.
  * What was tried goes into the stage's report, and what was seen is published (npg_fact_candidate_clouds).
  * NPG_MEMORY, NPG_STOPPED. */
-npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, bool is_open,
-                               npg_candidate *chosen);
+npg_status npg_choose_pass_end(npg_choose_pass *pass, npg_worker *worker, npg_candidate *chosen);
 
 void npg_choose_pass_clear(npg_choose_pass *pass);
 

@@ -10,9 +10,10 @@
  * more frames. */
 #define EXPLAINED_STEP 0.1
 
-npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds)
+npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t attempts)
 {
-    *loop = (npg_reference_loop){.brief = {.rounds_left = rounds,
+    *loop = (npg_reference_loop){.attempts = attempts,
+                                 .brief = {.rounds_left = rounds,
                                            .key = -1,
                                            .takes_gathered = true,
                                            .keeps_gathered = true,
@@ -38,17 +39,17 @@ static void grow(npg_reference_loop *loop, int64_t unreached)
 
 /* ---- which keyframe ---- */
 
-void npg_reference_offer(npg_reference_loop *loop, const int64_t *keys, size_t count)
-{
-    loop->other_count = 0;
-    for (size_t i = 0; i < count && loop->other_count < NPG_ATTEMPTS_MOST; i++)
-        loop->others[loop->other_count++] = keys[i];
-}
-
 /* Whether the keyframe of the pass that ended last is the best so far. */
 static bool keeps_last(const npg_reference_loop *loop)
 {
     return loop->kept == loop->tried_count - 1;
+}
+
+static bool was_tried(const npg_reference_loop *loop, int64_t key)
+{
+    size_t i = 0;
+    while (i < loop->tried_count && loop->tried[i].key != key) i++;
+    return i < loop->tried_count;
 }
 
 /* Whether another keyframe is to be followed before anything is made of the pass that ended.  A side of the body
@@ -61,8 +62,9 @@ static bool tries_another(npg_reference_loop *loop, const npg_pass_result *resul
     loop->tried[loop->tried_count++] = *result;
     if (result->bad_count < loop->tried[loop->kept].bad_count) loop->kept = at;
     bool is_open = result->is_side || result->unreached_count;
-    if (is_open || !loop->tried[loop->kept].bad_count || at == loop->other_count) return false;
-    brief->key = loop->others[at];
+    if (is_open || !loop->tried[loop->kept].bad_count || at == loop->attempts) return false;
+    if (result->failing < 0 || was_tried(loop, result->failing)) return false;
+    brief->key = result->failing;
     brief->is_attempt = true;
     brief->keeps_gathered = keeps_last(loop);
     brief->takes_gathered = brief->takes_poses = false;

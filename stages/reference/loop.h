@@ -1,8 +1,10 @@
 /* Loop: what is decided between two passes over all frames, of which each follows the reference so far and
  * gathers the points for the next one.
  *
- * The first pass is a trial of the keyframe: where frames fail with it, others are tried, and the one with the
- * fewest failures is kept, with what was gathered for it.
+ * The first pass is a trial of the keyframe.  Where frames fail with it, the one that fails most clearly is tried
+ * as the keyframe: parts that touch in one frame are joined in its surface, and which part in another shows it; so
+ * do frames that a surface lacks something of.  The keyframe with the fewest failures is kept, with what was
+ * gathered for it.
  *
  * One owner decides it all: how many passes there are, whether a reference that is one side of the body grows,
  * what is asked of frames that it is to reach, and whether what was gathered makes the next reference.  The
@@ -20,20 +22,20 @@ typedef struct npg_pass_result {
     int64_t unreached_count; /* frames that see too much that the reference does not have, and those beyond */
     bool has_changed;        /* it does not explain the capture to both its ends ...    */
     int64_t explained_from, explained_to; /* ... but from and to the frames of these indices */
+    int64_t failing;  /* the frame that could be the keyframe and fails most clearly; -1: none */
     bool is_side;     /* it is a side of the body: what it lacks says nothing of how that is joined */
     bool has_images;  /* frames can contradict it */
     bool is_beatable; /* another keyframe's reference could do better */
 } npg_pass_result;
 
-#define NPG_ATTEMPTS_MOST NPG_CHOICE_MAX
+#define NPG_ATTEMPTS_MOST 5
 
 /* {0} before npg_reference_begin().  Nothing to close. */
 typedef struct npg_reference_loop {
     npg_brief brief;                              /* the last one given */
     npg_pass_result tried[NPG_ATTEMPTS_MOST + 1]; /* what each keyframe came to ...        */
-    size_t tried_count, kept;                     /* ... and which is the best so far      */
-    int64_t others[NPG_ATTEMPTS_MOST];            /* that may be tried, the best first ... */
-    size_t other_count;                           /* ... the i-th as the (i + 1)-th of all */
+    size_t tried_count, kept;                     /* ... and which is the best so far */
+    size_t attempts;                              /* that may be made after the first */
     bool is_settled;                              /* the keyframe is no longer in question */
     bool is_compared;                             /* it was chosen among candidates ...    */
     npg_pass_result trial;                        /* ... after the pass that came to this  */
@@ -43,12 +45,9 @@ typedef struct npg_reference_loop {
     bool is_limited;                              /* the pass to come is for what it explains alone     */
 } npg_reference_loop;
 
-/* The brief of the first pass, of `rounds` that are to gather points. */
-npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds);
-
-/* Keyframes (count indices, the best first) that are tried, while frames fail, as long as the first pass has not
- * ended; they replace those of before. */
-void npg_reference_offer(npg_reference_loop *loop, const int64_t *keys, size_t count);
+/* The brief of the first pass, of `rounds` that are to gather points, with so many attempts with other keyframes
+ * (NPG_ATTEMPTS_MOST at most). */
+npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t attempts);
 
 /* The brief of the next one.  Parts that come, go or open belong to no common surface, and hiding them in one would
  * silence the alarm: where the reference does not explain all frames, those that it explains are followed once

@@ -6,6 +6,9 @@
  *
  * Not in the paper, whose reference is the surface of one frame. */
 #include "reference/reference.h"
+
+#include <stdlib.h>
+
 #include "geometry/geometry.h"
 #include "outlier/normals.h"
 #include "pipeline/options.h"
@@ -33,8 +36,8 @@ static const npg_option options[] = {
     NPG_KEY(INT,    "reference-rounds", AT(rounds), "1",   1, 20, "N",
         "Times that the points of all frames are gathered with the reference so far"),
     NPG_KEY(INT,    "attempts",         AT(attempts), "1", 0, NPG_ATTEMPTS_MOST, "N",
-        "Other keyframes that are tried where frames are below the bar with the one chosen; "
-        "the one with the fewest such frames is kept"),
+        "Other keyframes that are tried where frames are below the bar with the one chosen: each the frame that "
+        "fails most clearly with the last; the one with the fewest such frames is kept"),
     {0}};
 /* clang-format on */
 
@@ -91,6 +94,25 @@ static npg_status is_beatable(bool *beatable, npg_worker *worker)
     return NPG_OK;
 }
 
+/* The frame of the sample that fails most clearly: in the middle of the longer stretch that the reference does not
+ * explain; without one, nearest to the worst of those below the bar.  -1: none, or the keyframe is not in question. */
+static int64_t find_failing(const npg_worker *worker, const npg_pass_result *result)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
+    int64_t before = result->explained_from, behind = facts->planned_count - 1 - result->explained_to;
+    int64_t first = before > behind ? 0 : result->explained_to + 1, found = -1;
+    int64_t end = before > behind ? before : facts->planned_count, twice = first + end - 1;
+    if (!clouds || !facts->choice.is_open || (!result->has_changed && !facts->unfit_count)) return -1;
+    if (!result->has_changed) first = 0, twice = 2 * facts->unfit_worst;
+    for (size_t i = 0; i < clouds->count; i++) {
+        int64_t index = clouds->list[i].index;
+        bool is_in = index >= first && index < end && index != result->key;
+        if (is_in && (found < 0 || llabs(2 * index - twice) < llabs(2 * found - twice))) found = index;
+    }
+    return found;
+}
+
 /* A surface with a border, where sensors saw it, is a side of the body. */
 static npg_status result_of(npg_pass_result *result, npg_worker *worker)
 {
@@ -105,6 +127,7 @@ static npg_status result_of(npg_pass_result *result, npg_worker *worker)
                                 .explained_to = facts->has_changed[0] ? facts->changed_at[0] - 1 : last,
                                 .is_side = facts->sensor_count_max && edges.border_edges,
                                 .has_images = facts->view_count_max > 0};
+    result->failing = find_failing(worker, result);
     result->bad_count = facts->unfit_count + last - result->explained_to + result->explained_from;
     NPG_TRY(is_beatable(&result->is_beatable, worker));
     result->is_beatable |= result->bad_count && facts->choice.is_tried;
@@ -162,18 +185,10 @@ static npg_status begin(npg_worker *worker)
     npg_reference_loop *loop;
     NPG_TRY(npg_alloc(&loop, NPG_FOR_MESH, sizeof *loop));
     npg_worker_keep(worker, loop, release_loop);
-    *npg_own(worker, brief) = npg_reference_begin(loop, s->usable > 1 ? s->rounds : 0);
+    *npg_own(worker, brief) = npg_reference_begin(loop, s->usable > 1 ? s->rounds : 0, (size_t)s->attempts);
     *npg_own(worker, sensor_count_max) = s->sensors;
     *npg_own(worker, view_count_max) = s->views;
     return NPG_OK;
-}
-
-static void offer(const npg_worker *worker, npg_reference_loop *loop)
-{
-    const state *s = npg_worker_state(worker);
-    const npg_choice *choice = &npg_worker_facts(worker)->choice;
-    size_t most = (size_t)s->attempts;
-    npg_reference_offer(loop, choice->ranked, choice->ranked_count < most ? choice->ranked_count : most);
 }
 
 /* The keyframe's surface is there, or candidates were compared. */
@@ -182,7 +197,6 @@ static npg_status settle_choice(npg_worker *worker, npg_reference_loop *loop)
     const npg_facts *facts = npg_worker_facts(worker);
     bool beatable, was_open = !loop->is_settled;
     if (loop->brief.compares) {
-        offer(worker, loop);
         *npg_own(worker, brief) = npg_reference_compared(loop, facts->plan.key);
         if (loop->tried_count) tell(worker, loop, &loop->trial, was_open);
         return NPG_OK;
@@ -197,7 +211,6 @@ static npg_status settle_pass(npg_worker *worker, npg_reference_loop *loop)
 {
     npg_pass_result result;
     bool was_open = !loop->is_settled;
-    if (!loop->tried_count) offer(worker, loop);
     NPG_TRY(result_of(&result, worker));
     *npg_own(worker, brief) = npg_reference_next(loop, &result);
     json_object_set_new(npg_worker_report(worker), "passes_grown", json_integer((json_int_t)loop->grown));

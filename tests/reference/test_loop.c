@@ -30,7 +30,7 @@ static void every_round_is_walked_once(void **state)
     npg_reference_loop loop;
     for (int64_t rounds = 0; rounds < 4; rounds++) {
         int64_t walked = 0;
-        npg_brief brief = npg_reference_begin(&loop, rounds);
+        npg_brief brief = npg_reference_begin(&loop, rounds, 2);
         for (; brief.rounds_left; walked++) {
             assert_false(brief.leaves_open || brief.was_open);
             brief = next(&loop, 0, false);
@@ -44,7 +44,7 @@ static void what_a_reference_explains_is_gathered_alone(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_brief brief = npg_reference_begin(&loop, 1);
+    npg_brief brief = npg_reference_begin(&loop, 1, 2);
     assert_true(brief.gathers_from < 0 && brief.gathers_to > 1000);
     brief = next(&loop, 0, true);
     assert_false(brief.takes_gathered);
@@ -60,7 +60,7 @@ static void too_few_explained_frames_are_no_reference(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_reference_begin(&loop, 1);
+    npg_reference_begin(&loop, 1, 2);
     const npg_pass_result result = {.has_changed = true, .explained_from = 5, .explained_to = 6};
     npg_brief brief = npg_reference_next(&loop, &result);
     assert_false(brief.takes_gathered);
@@ -71,7 +71,7 @@ static void a_side_grows_until_all_is_reached_and_is_gathered_once_more(void **s
 {
     (void)state;
     npg_reference_loop loop;
-    npg_brief brief = npg_reference_begin(&loop, 1);
+    npg_brief brief = npg_reference_begin(&loop, 1, 2);
     int64_t passes = 0;
     for (int64_t unreached = 60; unreached > 0; unreached -= 20, passes++) {
         brief = next_side(&loop, unreached);
@@ -92,7 +92,7 @@ static void a_side_that_reaches_all_is_gathered_whatever_it_lacks(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_reference_begin(&loop, 1);
+    npg_reference_begin(&loop, 1, 2);
     npg_brief brief = next_side(&loop, 0);
     assert_true(brief.takes_gathered);
     assert_int_equal(brief.rounds_left, 1); /* what was past its border was not followed */
@@ -106,7 +106,7 @@ static void a_side_before_cameras_is_looked_at_once_more_and_trimmed(void **stat
     (void)state;
     npg_reference_loop loop;
     const npg_pass_result side = {.is_side = true, .has_images = true};
-    npg_reference_begin(&loop, 1);
+    npg_reference_begin(&loop, 1, 2);
     npg_brief brief = npg_reference_next(&loop, &side);
     assert_int_equal(brief.rounds_left, 1); /* what was past its border was not followed */
     assert_false(brief.trims_only);
@@ -123,7 +123,7 @@ static void a_whole_body_is_not_trimmed(void **state)
     (void)state;
     npg_reference_loop loop;
     const npg_pass_result whole = {.has_images = true};
-    npg_reference_begin(&loop, 1);
+    npg_reference_begin(&loop, 1, 2);
     npg_brief brief = npg_reference_next(&loop, &whole);
     assert_int_equal(brief.rounds_left, 0);
     assert_false(brief.trims_only);
@@ -133,7 +133,7 @@ static void growth_in_vain_asks_for_less_and_then_ends(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_brief brief = npg_reference_begin(&loop, 1);
+    npg_brief brief = npg_reference_begin(&loop, 1, 2);
     double first = brief.explained_least, least = first;
     int passes = 0;
     for (; brief.rounds_left; passes++) {
@@ -150,33 +150,30 @@ static void growth_never_goes_on_for_ever(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_brief brief = npg_reference_begin(&loop, 1);
+    npg_brief brief = npg_reference_begin(&loop, 1, 2);
     int64_t passes = 0;
     for (int64_t unreached = 1000; brief.rounds_left; unreached--, passes++)
         brief = next(&loop, unreached, false); /* one frame more each time */
     assert_in_range(passes, 10, 100);
 }
 
-/* A pass with the keyframe `key` in which so many frames failed. */
-static npg_brief next_of(npg_reference_loop *loop, int64_t key, int64_t bad)
+/* A pass with the keyframe `key` in which so many frames failed, one of them most clearly. */
+static npg_brief next_of(npg_reference_loop *loop, int64_t key, int64_t bad, int64_t failing)
 {
-    const npg_pass_result result = {.key = key, .bad_count = bad, .explained_to = 20};
+    const npg_pass_result result = {.key = key, .bad_count = bad, .explained_to = 20, .failing = failing};
     return npg_reference_next(loop, &result);
 }
 
-static const int64_t others[] = {3, 7};
-
-static void a_keyframe_that_fails_gives_way_to_a_better_one(void **state)
+static void a_frame_that_fails_is_the_next_keyframe(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_reference_begin(&loop, 1);
-    npg_reference_offer(&loop, others, 2);
-    npg_brief brief = next_of(&loop, 5, 9);
+    npg_reference_begin(&loop, 1, 2);
+    npg_brief brief = next_of(&loop, 5, 9, 3);
     assert_true(brief.is_attempt && brief.rounds_left == 1);
     assert_int_equal(brief.key, 3);
     assert_false(brief.takes_gathered || brief.takes_poses);
-    brief = next_of(&loop, 3, 0); /* all is well: the other one is not tried */
+    brief = next_of(&loop, 3, 0, -1); /* all is well */
     assert_int_equal(brief.key, 3);
     assert_false(brief.is_attempt);
     assert_true(brief.takes_gathered && brief.takes_poses && loop.brief.keeps_gathered);
@@ -193,7 +190,7 @@ static void a_keyframe_that_none_can_beat_is_compared_with_none(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_reference_begin(&loop, 1);
+    npg_reference_begin(&loop, 1, 2);
     npg_brief brief = try_of(&loop, 5, false);
     assert_false(brief.compares);
     assert_true(brief.takes_gathered && brief.takes_poses);
@@ -204,7 +201,7 @@ static void the_pass_of_a_keyframe_that_stays_counts(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_reference_begin(&loop, 1);
+    npg_reference_begin(&loop, 1, 2);
     npg_brief brief = try_of(&loop, 5, true);
     assert_true(brief.compares);
     brief = npg_reference_compared(&loop, 5);
@@ -218,7 +215,7 @@ static void a_keyframe_that_is_beaten_is_followed_no_further(void **state)
     (void)state;
     for (int with_pass = 0; with_pass < 2; with_pass++) {
         npg_reference_loop loop;
-        npg_reference_begin(&loop, 1);
+        npg_reference_begin(&loop, 1, 2);
         npg_brief brief = with_pass ? try_of(&loop, 5, true) : npg_reference_doubt(&loop);
         assert_true(brief.compares);
         brief = npg_reference_compared(&loop, 8);
@@ -235,18 +232,17 @@ static void a_keyframe_that_does_no_better_is_taken_back(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_reference_begin(&loop, 2);
-    npg_reference_offer(&loop, others, 2);
-    next_of(&loop, 5, 4);
-    npg_brief brief = next_of(&loop, 3, 9);
+    npg_reference_begin(&loop, 2, 2);
+    next_of(&loop, 5, 4, 3);
+    npg_brief brief = next_of(&loop, 3, 9, 7);
     assert_int_equal(brief.key, 7);
     assert_false(loop.brief.keeps_gathered);
-    brief = next_of(&loop, 7, 4); /* no better is not enough */
+    brief = next_of(&loop, 7, 4, 9); /* there are two attempts, and no better is not enough */
     assert_int_equal(brief.key, 5);
     assert_false(brief.is_attempt || brief.takes_poses || loop.brief.keeps_gathered);
     assert_true(brief.takes_gathered);
     assert_int_equal(brief.rounds_left, 1); /* as without any attempt */
-    brief = next_of(&loop, 5, 4);           /* and it is not in question again */
+    brief = next_of(&loop, 5, 4, 3);        /* and it is not in question again */
     assert_int_equal(brief.key, 5);
     assert_true(brief.takes_gathered && brief.takes_poses);
     assert_int_equal(brief.rounds_left, 0);
@@ -256,15 +252,18 @@ static void no_other_keyframe_is_tried_without_need(void **state)
 {
     (void)state;
     npg_reference_loop loop;
-    npg_reference_begin(&loop, 1);
-    npg_reference_offer(&loop, others, 2);
-    assert_false(next_of(&loop, 5, 0).is_attempt);
-    npg_reference_begin(&loop, 1); /* nor of a side, which fails by what it lacks */
-    npg_reference_offer(&loop, others, 2);
-    const npg_pass_result side = {.key = 5, .bad_count = 9, .is_side = true};
+    npg_reference_begin(&loop, 1, 2);
+    assert_false(next_of(&loop, 5, 0, -1).is_attempt);
+    npg_reference_begin(&loop, 1, 2); /* nor of a side, which fails by what it lacks */
+    const npg_pass_result side = {.key = 5, .bad_count = 9, .is_side = true, .failing = 3};
     assert_false(npg_reference_next(&loop, &side).is_attempt);
-    npg_reference_begin(&loop, 1); /* nor where there is none */
-    assert_false(next_of(&loop, 5, 9).is_attempt);
+    npg_reference_begin(&loop, 1, 2); /* nor where none can be ... */
+    assert_false(next_of(&loop, 5, 9, -1).is_attempt);
+    npg_reference_begin(&loop, 1, 0); /* ... or shall be */
+    assert_false(next_of(&loop, 5, 9, 3).is_attempt);
+    npg_reference_begin(&loop, 1, 2); /* nor one twice */
+    assert_true(next_of(&loop, 5, 9, 3).is_attempt);
+    assert_false(next_of(&loop, 3, 9, 5).is_attempt);
 }
 
 int main(void)
@@ -279,7 +278,7 @@ int main(void)
         cmocka_unit_test(a_whole_body_is_not_trimmed),
         cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),
         cmocka_unit_test(growth_never_goes_on_for_ever),
-        cmocka_unit_test(a_keyframe_that_fails_gives_way_to_a_better_one),
+        cmocka_unit_test(a_frame_that_fails_is_the_next_keyframe),
         cmocka_unit_test(a_keyframe_that_none_can_beat_is_compared_with_none),
         cmocka_unit_test(the_pass_of_a_keyframe_that_stays_counts),
         cmocka_unit_test(a_keyframe_that_is_beaten_is_followed_no_further),
