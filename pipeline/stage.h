@@ -50,8 +50,9 @@ typedef struct npg_choice {
     size_t count, candidate_count; /* count 0: there is no choosing pass */
     int64_t frames[NPG_CHOICE_FRAMES];
     bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
-    bool is_open;  /* the user has named no keyframe: where it fails, another of these frames may be tried */
-    bool is_tried; /* the key alone is read: others are compared if its pass says that one could do better */
+    int64_t second; /* the best of the candidates that were compared, but for the one chosen; -1: none */
+    bool is_open;   /* the user has named no keyframe: where it fails, another of these frames may be tried */
+    bool is_tried;  /* the key alone is read: others are compared if its pass says that one could do better */
 } npg_choice;
 
 /* Whether the frame with this index is one of the candidates. */

@@ -21,7 +21,7 @@ void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, b
     if (stride > STRIDE_MOST) stride = STRIDE_MOST;
     int64_t side = NPG_CHOICE_FRAMES / 2 * stride, first = key % stride;
     if (key - side > first) first = key - side;
-    *choice = (npg_choice){.is_open = choice->is_open};
+    *choice = (npg_choice){.is_open = choice->is_open, .second = -1};
     for (int64_t i = first; i < frame_count && choice->count < NPG_CHOICE_FRAMES; i += stride) {
         choice->is_candidate[choice->count] = i == key;
         choice->frames[choice->count++] = i;
@@ -132,6 +132,17 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
     return status;
 }
 
+/* The best that could be followed, but for list[best], by the judge alone; -1: none. */
+static int64_t second_of(const npg_candidate *list, size_t count, size_t best)
+{
+    size_t second = count;
+    for (size_t i = 0; i < count; i++)
+        if (i != best && list[i].is_followed &&
+            (second == count || list[i].judgement.mean < list[second].judgement.mean))
+            second = i;
+    return second < count ? list[second].index : -1;
+}
+
 /* ---- the pass ---- */
 
 npg_status npg_choose_pass_add(npg_choose_pass *pass, const npg_facts *facts, npg_chunk *chunk)
@@ -171,6 +182,7 @@ static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_c
     NPG_TRY(npg_candidates_try(list, &count, &best, clouds, facts->plan.key, &settings));
     if (!count) return NPG_OK;
     *chosen = list[best];
+    npg_own(worker, choice)->second = second_of(list, count, best);
     report_candidates(worker, list, count, npg_clock_s() - since);
     npg_worker_log(worker, NPG_LOG_INFO, chosen->number, "is the keyframe, of %zu candidates (judged %.3f)",
                    count, chosen->judgement.mean);

@@ -63,8 +63,8 @@ static bool tries_another(npg_reference_loop *loop, const npg_pass_result *resul
     if (result->bad_count < loop->tried[loop->kept].bad_count) loop->kept = at;
     bool is_open = result->is_side || result->unreached_count;
     if (is_open || !loop->tried[loop->kept].bad_count || at == loop->attempts) return false;
-    if (result->failing < 0 || was_tried(loop, result->failing)) return false;
-    brief->key = result->failing;
+    if (result->next < 0 || was_tried(loop, result->next)) return false;
+    brief->key = result->next;
     brief->is_attempt = true;
     brief->keeps_gathered = keeps_last(loop);
     brief->takes_gathered = brief->takes_poses = false;

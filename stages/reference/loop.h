@@ -1,10 +1,9 @@
 /* Loop: what is decided between two passes over all frames, of which each follows the reference so far and
  * gathers the points for the next one.
  *
- * The first pass is a trial of the keyframe.  Where frames fail with it, the one that fails most clearly is tried
- * as the keyframe: parts that touch in one frame are joined in its surface, and which part in another shows it; so
- * do frames that a surface lacks something of.  The keyframe with the fewest failures is kept, with what was
- * gathered for it.
+ * The first pass is a trial of the keyframe.  Where frames fail with it, one that fails is tried as the keyframe:
+ * what touches in one frame is joined in its surface, and is not in the surface of a frame where it parts.  The
+ * keyframe with the fewest failures is kept, with what was gathered for it.
  *
  * One owner decides it all: how many passes there are, whether a reference that is one side of the body grows,
  * what is asked of frames that it is to reach, and whether what was gathered makes the next reference.  The
@@ -22,7 +21,7 @@ typedef struct npg_pass_result {
     int64_t unreached_count; /* frames that see too much that the reference does not have, and those beyond */
     bool has_changed;        /* it does not explain the capture to both its ends ...    */
     int64_t explained_from, explained_to; /* ... but from and to the frames of these indices */
-    int64_t failing;  /* the frame that could be the keyframe and fails most clearly; -1: none */
+    int64_t next;                         /* the keyframe to try where it fails; -1: none */
     bool is_side;     /* it is a side of the body: what it lacks says nothing of how that is joined */
     bool has_images;  /* frames can contradict it */
     bool is_beatable; /* another keyframe's reference could do better */

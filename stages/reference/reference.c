@@ -10,6 +10,7 @@
 #include <stdlib.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "outlier/normals.h"
 #include "pipeline/options.h"
 #include "pipeline/stage.h"
@@ -36,8 +37,8 @@ static const npg_option options[] = {
     NPG_KEY(INT,    "reference-rounds", AT(rounds), "1",   1, 20, "N",
         "Times that the points of all frames are gathered with the reference so far"),
     NPG_KEY(INT,    "attempts",         AT(attempts), "1", 0, NPG_ATTEMPTS_MOST, "N",
-        "Other keyframes that are tried where frames are below the bar with the one chosen: each the frame that "
-        "fails most clearly with the last; the one with the fewest such frames is kept"),
+        "Other keyframes that are tried where frames are below the bar with the one chosen, frames that fail first; "
+        "the one with the fewest such frames is kept"),
     {0}};
 /* clang-format on */
 
@@ -94,9 +95,10 @@ static npg_status is_beatable(bool *beatable, npg_worker *worker)
     return NPG_OK;
 }
 
-/* The frame of the sample that fails most clearly: in the middle of the longer stretch that the reference does not
- * explain; without one, nearest to the worst of those below the bar.  -1: none, or the keyframe is not in question. */
-static int64_t find_failing(const npg_worker *worker, const npg_pass_result *result)
+/* The keyframe to try next; -1: none, or it is not in question.  Of the sample the frame that fails most clearly: in the
+ * middle of the longer stretch that the reference does not explain; without one, nearest to the worst of those below
+ * the bar.  Where most frames fail none of them says more than the others, and the second of the judge is next. */
+static int64_t find_next(const npg_worker *worker, const npg_pass_result *result)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
@@ -104,6 +106,7 @@ static int64_t find_failing(const npg_worker *worker, const npg_pass_result *res
     int64_t first = before > behind ? 0 : result->explained_to + 1, found = -1;
     int64_t end = before > behind ? before : facts->planned_count, twice = first + end - 1;
     if (!clouds || !facts->choice.is_open || (!result->has_changed && !facts->unfit_count)) return -1;
+    if ((double)result->bad_count > NPG_MAJORITY * (double)facts->planned_count) return facts->choice.second;
     if (!result->has_changed) first = 0, twice = 2 * facts->unfit_worst;
     for (size_t i = 0; i < clouds->count; i++) {
         int64_t index = clouds->list[i].index;
@@ -127,8 +130,8 @@ static npg_status result_of(npg_pass_result *result, npg_worker *worker)
                                 .explained_to = facts->has_changed[0] ? facts->changed_at[0] - 1 : last,
                                 .is_side = facts->sensor_count_max && edges.border_edges,
                                 .has_images = facts->view_count_max > 0};
-    result->failing = find_failing(worker, result);
     result->bad_count = facts->unfit_count + last - result->explained_to + result->explained_from;
+    result->next = find_next(worker, result);
     NPG_TRY(is_beatable(&result->is_beatable, worker));
     result->is_beatable |= result->bad_count && facts->choice.is_tried;
     return NPG_OK;

@@ -158,9 +158,9 @@ static void growth_never_goes_on_for_ever(void **state)
 }
 
 /* A pass with the keyframe `key` in which so many frames failed, one of them most clearly. */
-static npg_brief next_of(npg_reference_loop *loop, int64_t key, int64_t bad, int64_t failing)
+static npg_brief next_of(npg_reference_loop *loop, int64_t key, int64_t bad, int64_t next_key)
 {
-    const npg_pass_result result = {.key = key, .bad_count = bad, .explained_to = 20, .failing = failing};
+    const npg_pass_result result = {.key = key, .bad_count = bad, .explained_to = 20, .next = next_key};
     return npg_reference_next(loop, &result);
 }
 
@@ -255,7 +255,7 @@ static void no_other_keyframe_is_tried_without_need(void **state)
     npg_reference_begin(&loop, 1, 2);
     assert_false(next_of(&loop, 5, 0, -1).is_attempt);
     npg_reference_begin(&loop, 1, 2); /* nor of a side, which fails by what it lacks */
-    const npg_pass_result side = {.key = 5, .bad_count = 9, .is_side = true, .failing = 3};
+    const npg_pass_result side = {.key = 5, .bad_count = 9, .is_side = true, .next = 3};
     assert_false(npg_reference_next(&loop, &side).is_attempt);
     npg_reference_begin(&loop, 1, 2); /* nor where none can be ... */
     assert_false(next_of(&loop, 5, 9, -1).is_attempt);
