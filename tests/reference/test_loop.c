@@ -157,7 +157,7 @@ static void growth_never_goes_on_for_ever(void **state)
     assert_in_range(passes, 10, 100);
 }
 
-/* A pass with the keyframe `key` in which so many frames failed, one of them most clearly. */
+/* A pass with the keyframe `key` in which so many frames failed, and the one to try next. */
 static npg_brief next_of(npg_reference_loop *loop, int64_t key, int64_t bad, int64_t next_key)
 {
     const npg_pass_result result = {.key = key, .bad_count = bad, .explained_to = 20, .next = next_key};
