@@ -81,20 +81,27 @@ static void list_candidates(choosing *c)
     }
 }
 
+/* Of those that could be followed, but for list[but], the one of the least figure; count: there is none. */
+static size_t least_but(const npg_candidate *list, size_t count, size_t but)
+{
+    size_t least = count;
+    for (size_t i = 0; i < count; i++)
+        if (i != but && list[i].is_followed &&
+            (least == count || list[i].judgement.mean < list[least].judgement.mean))
+            least = i;
+    return least;
+}
+
 /* The one of the least figure, where that is better than the one by score clearly, or beyond chance.  One of them is
  * enough: a candidate does well near itself and badly far off, so the differences of two scatter whichever is
  * better. */
 static size_t least_of(const npg_candidate *list, size_t count, size_t scored)
 {
-    size_t first = scored < count ? scored : 0, best = first;
-    if (!count) return 0;
-    for (size_t i = 0; i < count; i++)
-        if (list[i].is_followed &&
-            (!list[best].is_followed || list[i].judgement.mean < list[best].judgement.mean))
-            best = i;
-    return !list[first].is_followed || npg_judged_clearly(&list[best].judgement, &list[first].judgement) ||
-                   npg_judged_worse(&list[first].judgement, &list[best].judgement)
-               ? best
+    size_t first = scored < count ? scored : 0, least = least_but(list, count, count);
+    if (least == count) return first;
+    return !list[first].is_followed || npg_judged_clearly(&list[least].judgement, &list[first].judgement) ||
+                   npg_judged_worse(&list[first].judgement, &list[least].judgement)
+               ? least
                : first;
 }
 
@@ -130,17 +137,6 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
     *count = c.count;
     *best = best_of(list, c.count, at);
     return status;
-}
-
-/* The best that could be followed, but for list[best], by the judge alone; -1: none. */
-static int64_t second_of(const npg_candidate *list, size_t count, size_t best)
-{
-    size_t second = count;
-    for (size_t i = 0; i < count; i++)
-        if (i != best && list[i].is_followed &&
-            (second == count || list[i].judgement.mean < list[second].judgement.mean))
-            second = i;
-    return second < count ? list[second].index : -1;
 }
 
 /* ---- the pass ---- */
@@ -182,7 +178,8 @@ static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_c
     NPG_TRY(npg_candidates_try(list, &count, &best, clouds, facts->plan.key, &settings));
     if (!count) return NPG_OK;
     *chosen = list[best];
-    npg_own(worker, choice)->second = second_of(list, count, best);
+    size_t second = least_but(list, count, best);
+    if (second < count) npg_own(worker, choice)->second = list[second].index;
     report_candidates(worker, list, count, npg_clock_s() - since);
     npg_worker_log(worker, NPG_LOG_INFO, chosen->number, "is the keyframe, of %zu candidates (judged %.3f)",
                    count, chosen->judgement.mean);
