@@ -4,8 +4,8 @@
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
 #include <pcl/surface/3rdparty/poisson4/octree_poisson.h>
-// The product comes before PCL's templates that call it.
-#include "mesh/poisson_product.hpp"
+// The solver comes before PCL's templates that call it.
+#include "mesh/poisson_solver.hpp"
 #include <pcl/surface/3rdparty/poisson4/function_data.h>
 #include <pcl/surface/3rdparty/poisson4/geometry.h>
 #include <pcl/surface/3rdparty/poisson4/multi_grid_octree_data.h>
