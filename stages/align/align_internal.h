@@ -23,9 +23,9 @@
  *
  * and the pose of the least cost (track.h) stays.  What is found helps the frames around it, so this is
  * repeated until none is found.  Before depth images a frame is lost when more of its points, or of the surface, is
- * astray than a few per cent; else when its Chamfer distance is well above that of the
- * window's best quarter, and so are its points' distances alone: a frame with fewer points or with holes has
- * surface far from them, too, and what it is then found by is a worse pose.  Not in the paper. */
+ * astray than a few per cent; else when its Chamfer distance is well above that of the window's best quarter, and so are
+ * its points' distances alone, or no other frame's is: a frame with fewer points or with holes has surface far from
+ * them, too, and what it is then found by is a worse pose.  Not in the paper. */
 
 /* A frame of a group.  pose and points are the caller's; the pose is changed where a better one is found. */
 typedef struct npg_recover_frame {

@@ -9,8 +9,9 @@
 #include "pipeline/order.h"
 
 /* Set by trial on a fast gallop: tests/bed/decisions.md, lost frames. */
-#define LOST        1.4  /* times what the best quarter has: its Chamfer distance, and ...            */
-#define POINTS_LOST 1.1  /* ... its points' distances alone, which holes do not raise                 */
+#define LOST        1.4  /* times what the best quarter has: its Chamfer distance, and ...              */
+#define MORE        1.1  /* ... its points' distances alone, which holes do not raise                   */
+#define APART       10   /* times what lies between the best quarter and the middle: no chance          */
 #define LEVEL_LEAST 1e-6 /* square units: what is below does not matter                                 */
 #define BETTER      0.95 /* times the cost of a frame's pose: what a new one must reach                 */
 #define SWEEPS      5    /* at most                                                                     */
@@ -70,12 +71,12 @@ typedef struct recovery {
     attempts by;
     npg_recover_frame *frames;
     size_t count;
-    double level;       /* Chamfer distance of the best quarter        */
-    double point_level; /* its part of the points, of the best quarter */
-    double *sorted;     /* count, scratch          */
-    npg_look *looks;    /* count; closed with the recovery             */
-    double *moved;      /* MOVED_MOST x K x 12, scratch                */
-    size_t *lost;       /* count: which are lost                       */
+    double level, middle; /* Chamfer distance of the best quarter, and the median */
+    double point_level;   /* its part of the points, of the best quarter */
+    double *sorted;       /* count, scratch          */
+    npg_look *looks;      /* count; closed with the recovery             */
+    double *moved;        /* MOVED_MOST x K x 12, scratch                */
+    size_t *lost;         /* count: which are lost                       */
     npg_recover_result *result;
 } recovery;
 
@@ -84,37 +85,45 @@ static bool is_known(const npg_recover_frame *frame)
     return frame->cloud.count > 0;
 }
 
+/* Chamfer distance that tells a frame from the others: what holes do to all of them is within it. */
+static double apart(const recovery *r)
+{
+    return fmax(MORE * r->level, r->level + APART * (r->middle - r->level));
+}
+
 /* Depth images tell by themselves: a part of the body is lost, or stands where nothing is. */
 static bool is_off(const recovery *r, const npg_recover_frame *frame)
 {
     const npg_tracked *tracked = &frame->tracked;
-    return is_known(frame) &&
-           (tracked->by_images ? tracked->astray > NPG_FEW : tracked->chamfer > LOST * r->level);
+    return is_known(frame) && (tracked->by_images ? tracked->astray > NPG_FEW
+                                                  : tracked->chamfer > fmin(LOST * r->level, apart(r)));
 }
 
-/* Off because its surface has no points near it is not lost: a frame with fewer points, or with holes, has
- * that, too. */
+/* Off because its surface has no points near it is not lost, unless the others are all alike: a frame with fewer
+ * points, or with holes, has that, too. */
 static bool is_lost(const recovery *r, const npg_recover_frame *frame)
 {
-    return is_off(r, frame) &&
-           (frame->tracked.by_images || frame->tracked.point_dist_sq > POINTS_LOST * r->point_level);
+    const npg_tracked *tracked = &frame->tracked;
+    return is_off(r, frame) && (tracked->by_images || tracked->point_dist_sq > MORE * r->point_level ||
+                                tracked->chamfer > apart(r));
 }
 
-/* offset: of a figure in npg_tracked. */
-static double best_quarter(const recovery *r, size_t offset)
+/* That of the frames' figures below which a share of them lies; offset: of the figure in npg_tracked. */
+static double level_of(const recovery *r, size_t offset, size_t quarters)
 {
     size_t known = 0;
     for (size_t i = 0; i < r->count; i++)
         if (is_known(&r->frames[i]))
             r->sorted[known++] = *(const double *)((const char *)&r->frames[i].tracked + offset);
     qsort(r->sorted, known, sizeof *r->sorted, npg_order_double);
-    return known ? r->sorted[known / 4] : 0;
+    return known ? r->sorted[quarters * known / 4] : 0;
 }
 
 static void set_levels(recovery *r)
 {
-    r->level = fmax(LEVEL_LEAST, best_quarter(r, offsetof(npg_tracked, chamfer)));
-    r->point_level = best_quarter(r, offsetof(npg_tracked, point_dist_sq));
+    r->level = fmax(LEVEL_LEAST, level_of(r, offsetof(npg_tracked, chamfer), 1));
+    r->middle = fmax(r->level, level_of(r, offsetof(npg_tracked, chamfer), 2));
+    r->point_level = level_of(r, offsetof(npg_tracked, point_dist_sq), 1);
 }
 
 /* ---- frames that look alike ---- */
