@@ -73,6 +73,7 @@ typedef struct recovery {
     size_t count;
     double level, middle; /* Chamfer distance of the best quarter, and the median */
     double point_level;   /* its part of the points, of the best quarter */
+    double usual_count;   /* of points, median; infinite where a quarter of the frames is no sample */
     double *sorted;       /* count, scratch          */
     npg_look *looks;      /* count; closed with the recovery             */
     double *moved;        /* MOVED_MOST x K x 12, scratch                */
@@ -88,7 +89,8 @@ static bool is_known(const npg_recover_frame *frame)
 /* Chamfer distance that tells a frame from the others: what holes do to all of them is within it. */
 static double apart(const recovery *r)
 {
-    return fmax(MORE * r->level, r->level + APART * (r->middle - r->level));
+    return isinf(r->usual_count) ? HUGE_VAL
+                                 : fmax(MORE * r->level, r->level + APART * (r->middle - r->level));
 }
 
 /* Depth images tell by themselves: a part of the body is lost, or stands where nothing is. */
@@ -99,13 +101,23 @@ static bool is_off(const recovery *r, const npg_recover_frame *frame)
                                                   : tracked->chamfer > fmin(LOST * r->level, apart(r)));
 }
 
-/* Off because its surface has no points near it is not lost, unless the others are all alike: a frame with fewer
- * points, or with holes, has that, too. */
+/* Off because its surface has no points near it is not lost, unless the others are all alike and it has as many points
+ * as they: a frame with fewer, or with holes, has that, too. */
 static bool is_lost(const recovery *r, const npg_recover_frame *frame)
 {
     const npg_tracked *tracked = &frame->tracked;
+    bool is_whole = MORE * (double)frame->cloud.count >= r->usual_count;
     return is_off(r, frame) && (tracked->by_images || tracked->point_dist_sq > MORE * r->point_level ||
-                                tracked->chamfer > apart(r));
+                                (is_whole && tracked->chamfer > apart(r)));
+}
+
+static double middle_count(const recovery *r)
+{
+    size_t known = 0;
+    for (size_t i = 0; i < r->count; i++)
+        if (is_known(&r->frames[i])) r->sorted[known++] = (double)r->frames[i].cloud.count;
+    qsort(r->sorted, known, sizeof *r->sorted, npg_order_double);
+    return known / 4 < NPG_CONFIRMED ? HUGE_VAL : r->sorted[known / 2];
 }
 
 /* That of the frames' figures below which a share of them lies; offset: of the figure in npg_tracked. */
@@ -123,6 +135,7 @@ static void set_levels(recovery *r)
 {
     r->level = fmax(LEVEL_LEAST, level_of(r, offsetof(npg_tracked, chamfer), 1));
     r->middle = fmax(r->level, level_of(r, offsetof(npg_tracked, chamfer), 2));
+    r->usual_count = middle_count(r);
     r->point_level = level_of(r, offsetof(npg_tracked, point_dist_sq), 1);
 }
 

@@ -1,6 +1,6 @@
 // Poisson solver: conjugate gradients in the place of PCL's, whose rows lie all over memory, one piece each: two
-// threads that read them were slower than one.  Here they lie one behind the other, and a step is divided by the
-// diagonal (Jacobi), so that the same accuracy takes half of the steps where points weigh on some cells alone.
+// threads that read them take as long as one.  Here they lie one behind the other.  All additions and their order are
+// PCL's, so the bits are.
 #pragma once
 
 #include <pcl/surface/3rdparty/poisson4/sparse_matrix.h>
@@ -12,98 +12,51 @@
 namespace pcl::poisson
 {
 
-// Of A x = b, A symmetric and positive: one triangle of it, with half of each entry of the diagonal, as PCL has it.
-// Rows are shared among `parts` threads; equal input and parts give equal bits.
-class ConjugateGradients
+// A symmetric matrix: one triangle, with half of each entry of the diagonal, as PCL has it.  Rows are shared among
+// `parts` threads.
+class PackedMatrix
 {
   public:
-    // fixes_mean: the mean of x is added to all of A x, which makes up for what a constant does not change.
-    ConjugateGradients(const SparseSymmetricMatrix<float> &matrix, int parts, bool fixes_mean)
-        : rows_(size_t(matrix.rows)), parts_(size_t(parts)), fixes_mean_(fixes_mean), begin_(rows_ + 1),
-          inverse_(rows_, 1), shares_(rows_ * parts_), sums_(parts_)
+    PackedMatrix(const SparseSymmetricMatrix<float> &matrix, int parts)
+        : rows_(size_t(matrix.rows)), parts_(size_t(parts)), begin_(rows_ + 1), shares_(rows_ * parts_)
     {
         for (size_t i = 0; i < rows_; i++) begin_[i + 1] = begin_[i] + size_t(matrix.rowSizes[i]);
         entries_.reset(new MatrixEntry<float>[begin_.back()]);
-        each_part([&](size_t, size_t first, size_t last) {
-            for (size_t i = first; i < last; i++) take_row(i, matrix[int(i)]);
-        });
+#pragma omp parallel for num_threads(parts)
+        for (size_t t = 0; t < parts_; t++)
+            for (size_t i = first_of(t); i < first_of(t + 1); i++)
+                std::copy_n(matrix[int(i)], begin_[i + 1] - begin_[i], &entries_[begin_[i]]);
     }
 
-    // x, where it starts, becomes the solution, to a residual of `accuracy` times the first one.  Returns the steps.
-    int solve(float *x, const float *b, int steps_most, double accuracy)
+    // out = A in.  fixes_mean: the mean of `in` is added to all of it, which makes up for what a constant does not change.
+    void multiply(float *out, const float *in, bool fixes_mean)
     {
-        std::vector<float> r(rows_), d(rows_), q(rows_); // residual, way, A way
-        multiply(q.data(), x);
-        Sums now = sum_up([&](size_t i) {
-            r[i] = b[i] - q[i];
-            d[i] = inverse_[i] * r[i];
-            return Sums{double(r[i]) * double(d[i]), double(r[i]) * double(r[i])};
-        });
-        const double enough = accuracy * accuracy * now.square;
-        int step = 0;
-        for (; step < steps_most && now.square > enough; step++) {
-            multiply(q.data(), d.data());
-            Sums along = sum_up([&](size_t i) { return Sums{double(d[i]) * double(q[i]), 0}; });
-            const float share = float(now.scaled / along.scaled);
-            const double before = now.scaled;
-            now = sum_up([&](size_t i) {
-                x[i] += d[i] * share;
-                r[i] -= q[i] * share;
-                double square = double(r[i]) * double(r[i]);
-                return Sums{square * double(inverse_[i]), square};
-            });
-            const float kept = float(now.scaled / before);
-            each_part([&](size_t, size_t first, size_t last) {
-                for (size_t i = first; i < last; i++) d[i] = inverse_[i] * r[i] + d[i] * kept;
-            });
+        float mean = 0;
+#pragma omp parallel for num_threads(int(parts_)) reduction(+ : mean)
+        for (size_t t = 0; t < parts_; t++) {
+            std::fill_n(&shares_[t * rows_], rows_, 0.0f);
+            add_rows(t, in);
+            for (size_t i = first_of(t); i < first_of(t + 1) && fixes_mean; i++) mean += in[i];
         }
-        return step;
+        mean /= float(rows_);
+#pragma omp parallel for num_threads(int(parts_))
+        for (size_t i = 0; i < rows_; i++) {
+            out[i] = mean;
+            for (size_t t = 0; t < parts_; t++) out[i] += shares_[t * rows_ + i];
+        }
     }
 
   private:
-    struct Sums {
-        double scaled, square;
-    };
-
-    // do_part(part, first row, last row)
-    template <typename Part> void each_part(Part do_part)
+    size_t first_of(size_t part) const
     {
-#pragma omp parallel for num_threads(int(parts_))
-        for (size_t t = 0; t < parts_; t++) do_part(t, rows_ * t / parts_, rows_ * (t + 1) / parts_);
+        return rows_ * part / parts_;
     }
 
-    // The sum of add(row), in the order of rows and parts.
-    template <typename Add> Sums sum_up(Add add)
+    // What the part's rows have in the product.  The sum of a row stays in a register.
+    void add_rows(size_t part, const float *__restrict in)
     {
-        each_part([&](size_t t, size_t first, size_t last) {
-            Sums sums = {0, 0};
-            for (size_t i = first; i < last; i++) {
-                Sums of = add(i);
-                sums.scaled += of.scaled;
-                sums.square += of.square;
-            }
-            sums_[t] = sums;
-        });
-        Sums all = {0, 0};
-        for (const Sums &sums : sums_) {
-            all.scaled += sums.scaled;
-            all.square += sums.square;
-        }
-        return all;
-    }
-
-    void take_row(size_t i, const MatrixEntry<float> *from)
-    {
-        for (size_t k = begin_[i]; k < begin_[i + 1]; k++, from++) {
-            entries_[k] = *from;
-            if (size_t(from->N) == i && from->Value > 0) inverse_[i] = 1 / (2 * from->Value);
-        }
-    }
-
-    // The share that rows [first, last) have in out = A in.  The sum of a row stays in a register.
-    void add_rows(size_t first, size_t last, float *__restrict out, const float *__restrict in) const
-    {
-        for (size_t i = first; i < last; i++) {
+        float *__restrict out = &shares_[part * rows_];
+        for (size_t i = first_of(part); i < first_of(part + 1); i++) {
             const MatrixEntry<float> *__restrict entry = &entries_[begin_[i]],
                                                  *end = &entries_[begin_[i + 1]];
             float sum = out[i];
@@ -120,50 +73,72 @@ class ConjugateGradients
         }
     }
 
-    void multiply(float *out, const float *in)
-    {
-        float mean = 0;
-        for (size_t i = 0; fixes_mean_ && i < rows_; i++) mean += in[i] / float(rows_);
-        each_part([&](size_t t, size_t first, size_t last) {
-            float *share = &shares_[t * rows_];
-            std::fill_n(share, rows_, 0.0f);
-            add_rows(first, last, share, in);
-        });
-        each_part([&](size_t, size_t first, size_t last) {
-            for (size_t i = first; i < last; i++) {
-                out[i] = mean;
-                for (size_t t = 0; t < parts_; t++) out[i] += shares_[t * rows_ + i];
-            }
-        });
-    }
-
     const size_t rows_, parts_;
-    const bool fixes_mean_;
     std::vector<size_t> begin_; // rows + 1: of each row's entries
     std::unique_ptr<MatrixEntry<float>[]> entries_;
-    std::vector<float> inverse_, shares_; // of the diagonal; parts x rows
-    std::vector<Sums> sums_;              // of each part
+    std::vector<float> shares_; // parts x rows
 };
 
-// Both ways in which PCL asks: with room for products, and without.
+// In the place of PCL's: x, where it starts, becomes the solution, to a residual of `accuracy` times the first one.
+// Returns the steps.  In the 50th PCL looks at the residual anew, and takes that step twice.
+inline int solve(const SparseSymmetricMatrix<float> &of, const Vector<float> &right, int most,
+                 Vector<float> &x, float accuracy, int parts, bool fixes_mean)
+{
+    PackedMatrix matrix(of, parts);
+    const float *b = &right[0];
+    int n = of.rows, step = 0;
+    std::vector<float> r(size_t(n), 0), d(size_t(n), 0), q(size_t(n), 0);
+    double square = 0;
+    matrix.multiply(r.data(), &x[0], fixes_mean);
+#pragma omp parallel for num_threads(parts) reduction(+ : square)
+    for (int i = 0; i < n; i++) {
+        d[i] = r[i] = b[i] - r[i];
+        square += r[i] * r[i];
+    }
+    const double enough = double(accuracy * accuracy) * square;
+    for (; step < most && square > enough; step++) {
+        double along = 0, before = square;
+        matrix.multiply(q.data(), d.data(), fixes_mean);
+#pragma omp parallel for num_threads(parts) reduction(+ : along)
+        for (int i = 0; i < n; i++) along += d[i] * q[i];
+        float share = float(square / along);
+        bool is_anew = step % 50 == 49;
+        if (is_anew) {
+            for (int i = 0; i < n; i++) x[i] += d[i] * share;
+            matrix.multiply(r.data(), &x[0], fixes_mean);
+        }
+        square = 0;
+#pragma omp parallel for num_threads(parts) reduction(+ : square)
+        for (int i = 0; i < n; i++) {
+            r[i] = is_anew ? b[i] - r[i] : r[i] - q[i] * share;
+            square += r[i] * r[i];
+            x[i] += d[i] * share;
+        }
+        float kept = float(square / before);
+#pragma omp parallel for num_threads(parts)
+        for (int i = 0; i < n; i++) d[i] = r[i] + d[i] * kept;
+    }
+    return step;
+}
+
+// Both ways in which PCL asks: without room for products, and with it.
 template <>
 template <>
 int SparseSymmetricMatrix<float>::Solve<float>(const SparseSymmetricMatrix<float> &matrix,
                                                const Vector<float> &b, int steps, Vector<float> &x,
                                                float accuracy, int, int threads, bool fixes_mean, bool)
 {
-    if (!matrix.rows) return 0;
-    return ConjugateGradients(matrix, threads, fixes_mean).solve(&x[0], &b[0], steps, double(accuracy));
+    return matrix.rows ? solve(matrix, b, steps, x, accuracy, threads, fixes_mean) : 0;
 }
 
 template <>
 template <>
 int SparseSymmetricMatrix<float>::Solve<float>(const SparseSymmetricMatrix<float> &matrix,
                                                const Vector<float> &b, int steps, Vector<float> &x,
-                                               MapReduceVector<float> &room, float accuracy, int reset,
-                                               bool fixes_mean, bool is_normal)
+                                               MapReduceVector<float> &room, float accuracy, int,
+                                               bool fixes_mean, bool)
 {
-    return Solve(matrix, b, steps, x, accuracy, reset, room.threads(), fixes_mean, is_normal);
+    return matrix.rows ? solve(matrix, b, steps, x, accuracy, room.threads(), fixes_mean) : 0;
 }
 
 } // namespace pcl::poisson

@@ -120,6 +120,10 @@ static void surface_without_points_is_lost_where_others_are_alike(void **state)
         c.frames[t].tracked.chamfer = 0.1 + 0.001 * t;
     }
     c.frames[2].tracked.chamfer = 0.13;
+    c.frames[2].cloud.count = VERTS / 2; /* half of the body */
+    assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
+    assert_int_equal(result.lost, 0);
+    c.frames[2].cloud.count = VERTS;
     assert_int_equal(npg_recover(c.tracker, &result, c.frames, FRAMES, NULL, NULL), NPG_OK);
     assert_int_equal(result.lost, 1);
     close_capture(&c);
