@@ -10,7 +10,7 @@
 
 /* Set by trial on a fast gallop: tests/bed/decisions.md, lost frames. */
 #define LOST        1.4  /* times what the best quarter has: its Chamfer distance, and ...              */
-#define MORE        1.1  /* ... its points' distances alone, which holes do not raise                   */
+#define MORE        1.1  /* ... its points' distances alone, which holes do not raise; the least excess */
 #define APART       10   /* times what lies between the best quarter and the middle: no chance          */
 #define LEVEL_LEAST 1e-6 /* square units: what is below does not matter                                 */
 #define BETTER      0.95 /* times the cost of a frame's pose: what a new one must reach                 */
@@ -71,13 +71,14 @@ typedef struct recovery {
     attempts by;
     npg_recover_frame *frames;
     size_t count;
-    double level, middle; /* Chamfer distance of the best quarter, and the median */
-    double point_level;   /* its part of the points, of the best quarter */
-    double usual_count;   /* of points, median; infinite where a quarter of the frames is no sample */
-    double *sorted;       /* count, scratch          */
-    npg_look *looks;      /* count; closed with the recovery             */
-    double *moved;        /* MOVED_MOST x K x 12, scratch                */
-    size_t *lost;         /* count: which are lost                       */
+    double level; /* Chamfer distance of the best quarter */
+    double apart; /* and what holes, which differ in all frames, do not come to; infinite: too few frames */
+    double point_level; /* the points' part of the distance, of the best quarter */
+    double usual_count; /* of points, median */
+    double *sorted;     /* count, scratch          */
+    npg_look *looks;    /* count; closed with the recovery             */
+    double *moved;      /* MOVED_MOST x K x 12, scratch                */
+    size_t *lost;       /* count: which are lost                       */
     npg_recover_result *result;
 } recovery;
 
@@ -86,19 +87,12 @@ static bool is_known(const npg_recover_frame *frame)
     return frame->cloud.count > 0;
 }
 
-/* Chamfer distance that tells a frame from the others: what holes do to all of them is within it. */
-static double apart(const recovery *r)
-{
-    return isinf(r->usual_count) ? HUGE_VAL
-                                 : fmax(MORE * r->level, r->level + APART * (r->middle - r->level));
-}
-
 /* Depth images tell by themselves: a part of the body is lost, or stands where nothing is. */
 static bool is_off(const recovery *r, const npg_recover_frame *frame)
 {
     const npg_tracked *tracked = &frame->tracked;
     return is_known(frame) && (tracked->by_images ? tracked->astray > NPG_FEW
-                                                  : tracked->chamfer > fmin(LOST * r->level, apart(r)));
+                                                  : tracked->chamfer > fmin(LOST * r->level, r->apart));
 }
 
 /* Off because its surface has no points near it is not lost, unless the others are all alike and it has as many points
@@ -108,35 +102,35 @@ static bool is_lost(const recovery *r, const npg_recover_frame *frame)
     const npg_tracked *tracked = &frame->tracked;
     bool is_whole = MORE * (double)frame->cloud.count >= r->usual_count;
     return is_off(r, frame) && (tracked->by_images || tracked->point_dist_sq > MORE * r->point_level ||
-                                (is_whole && tracked->chamfer > apart(r)));
+                                (is_whole && tracked->chamfer > r->apart));
 }
 
-static double middle_count(const recovery *r)
-{
-    size_t known = 0;
-    for (size_t i = 0; i < r->count; i++)
-        if (is_known(&r->frames[i])) r->sorted[known++] = (double)r->frames[i].cloud.count;
-    qsort(r->sorted, known, sizeof *r->sorted, npg_order_double);
-    return known / 4 < NPG_CONFIRMED ? HUGE_VAL : r->sorted[known / 2];
-}
+enum figure { CHAMFER, POINTS_PART, POINT_COUNT };
 
-/* That of the frames' figures below which a share of them lies; offset: of the figure in npg_tracked. */
-static double level_of(const recovery *r, size_t offset, size_t quarters)
+/* Puts a figure of the known frames in order; returns how many there are. */
+static size_t sort(recovery *r, enum figure figure)
 {
     size_t known = 0;
-    for (size_t i = 0; i < r->count; i++)
-        if (is_known(&r->frames[i]))
-            r->sorted[known++] = *(const double *)((const char *)&r->frames[i].tracked + offset);
+    for (size_t i = 0; i < r->count; i++) {
+        const npg_recover_frame *f = &r->frames[i];
+        const double of[] = {f->tracked.chamfer, f->tracked.point_dist_sq, (double)f->cloud.count};
+        if (is_known(f)) r->sorted[known++] = of[figure];
+    }
     qsort(r->sorted, known, sizeof *r->sorted, npg_order_double);
-    return known ? r->sorted[quarters * known / 4] : 0;
+    return known;
 }
 
 static void set_levels(recovery *r)
 {
-    r->level = fmax(LEVEL_LEAST, level_of(r, offsetof(npg_tracked, chamfer), 1));
-    r->middle = fmax(r->level, level_of(r, offsetof(npg_tracked, chamfer), 2));
-    r->usual_count = middle_count(r);
-    r->point_level = level_of(r, offsetof(npg_tracked, point_dist_sq), 1);
+    size_t known = sort(r, CHAMFER);
+    r->level = fmax(LEVEL_LEAST, known ? r->sorted[known / 4] : 0);
+    double middle = fmax(r->level, known ? r->sorted[known / 2] : 0);
+    r->apart =
+        known / 4 < NPG_CONFIRMED ? HUGE_VAL : fmax(MORE * r->level, r->level + APART * (middle - r->level));
+    sort(r, POINTS_PART);
+    r->point_level = known ? r->sorted[known / 4] : 0;
+    sort(r, POINT_COUNT);
+    r->usual_count = known ? r->sorted[known / 2] : 0;
 }
 
 /* ---- frames that look alike ---- */

@@ -80,7 +80,7 @@ class PackedMatrix
 };
 
 // In the place of PCL's: x, where it starts, becomes the solution, to a residual of `accuracy` times the first one.
-// Returns the steps.  In the 50th PCL looks at the residual anew, and takes that step twice.
+// Returns the steps; none where that is below `accuracy` itself.  In the 50th PCL looks at the residual anew, and takes that step twice.
 inline int solve(const SparseSymmetricMatrix<float> &of, const Vector<float> &right, int most,
                  Vector<float> &x, float accuracy, int parts, bool fixes_mean)
 {
@@ -95,7 +95,8 @@ inline int solve(const SparseSymmetricMatrix<float> &of, const Vector<float> &ri
         d[i] = r[i] = b[i] - r[i];
         square += r[i] * r[i];
     }
-    const double enough = double(accuracy * accuracy) * square;
+    const double least = double(accuracy * accuracy), enough = least * square;
+    if (square < least) return 0;
     for (; step < most && square > enough; step++) {
         double along = 0, before = square;
         matrix.multiply(q.data(), d.data(), fixes_mean);

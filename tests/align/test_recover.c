@@ -99,7 +99,7 @@ static void what_is_found_is_left_alone(void **state)
 
 /* As frames with few points, or with holes, have it: their surface is farther from points, each by as much as its
  * holes are large, but the points are not from it.  Where the others are alike, it is no hole. */
-static void surface_without_points_is_lost_where_others_are_alike(void **state)
+static void surface_without_points_is_lost_among_alike(void **state)
 {
     static capture c;
     npg_recover_result result;
@@ -172,13 +172,12 @@ static void attempts_end(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lost_frames_are_found_from_those_around),
-        cmocka_unit_test(lost_frames_are_found_where_the_body_went),
-        cmocka_unit_test(lost_frames_are_found_from_the_group_before),
-        cmocka_unit_test(what_is_found_is_left_alone),
-        cmocka_unit_test(surface_without_points_is_lost_where_others_are_alike),
-        cmocka_unit_test(what_images_call_astray_is_lost),
-        cmocka_unit_test(attempts_end)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(lost_frames_are_found_from_those_around),
+                                       cmocka_unit_test(lost_frames_are_found_where_the_body_went),
+                                       cmocka_unit_test(lost_frames_are_found_from_the_group_before),
+                                       cmocka_unit_test(what_is_found_is_left_alone),
+                                       cmocka_unit_test(surface_without_points_is_lost_among_alike),
+                                       cmocka_unit_test(what_images_call_astray_is_lost),
+                                       cmocka_unit_test(attempts_end)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
