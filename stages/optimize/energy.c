@@ -26,10 +26,10 @@ struct npg_energy {
     npg_mesh_neighbours ring;
     size_t threads;
     npg_point_matcher matchers[THREADS_MAX];
-    npg_arena window;              /* holds what follows, of the window at work */
-    float *positions;              /* T x W x 3: where the frames' surfaces are */
-    float *lambda;                 /* W */
-    const npg_energy_frame *given; /* loan */
+    npg_arena window; /* holds what follows, of the window at work */
+    float *positions; /* T x W x 3: where the frames' surfaces are */
+    float *posed;     /* T x W x 3: where they were aligned to, holes bridged */
+    float *lambda;    /* W */
     bool *is_known;
     double *spreads, *scores;   /* T */
     npg_energy_frame *frames;   /* T, on `positions` */
@@ -88,6 +88,7 @@ static npg_status open_window(npg_energy *e, const npg_energy_frame *frames, siz
     npg_arena *a = &e->window;
     npg_arena_release(a);
     e->positions = npg_arena_take(a, count * w, 3 * sizeof(float));
+    e->posed = npg_arena_take(a, count * w, 3 * sizeof(float));
     e->lambda = npg_arena_take(a, w, sizeof(float));
     e->is_known = npg_arena_take(a, count, sizeof(bool));
     e->spreads = npg_arena_take(a, count, sizeof(double));
@@ -206,12 +207,14 @@ static npg_status smooth(npg_energy *e, size_t count)
 {
     const npg_time_frames f = {count,       e->mesh->vert_count, e->positions, e->system.shares,
                                e->is_known, points_of(e, count)};
+    const uint32_t(*edges)[2] = (const uint32_t(*)[2])e->edges;
     frame_work r = {e, count};
     NPG_TRY(weigh_frames(e, count));
     NPG_TRY(npg_parallel(match_frames, &r, e->threads));
     NPG_TRY(npg_parallel(gather_quadrics, &r, e->threads));
-    NPG_TRY(
-        npg_time_smooth_choose(e->lambda, &f, e->quadrics, (const uint32_t(*)[2])e->edges, e->edge_count));
+    NPG_TRY(npg_time_bridge(&f, e->quadrics, edges, e->edge_count));
+    memcpy(e->posed, e->positions, 3 * count * e->mesh->vert_count * sizeof *e->posed);
+    NPG_TRY(npg_time_smooth_choose(e->lambda, &f, e->quadrics, edges, e->edge_count));
     e->lambda_median = lambda_median(e);
     NPG_TRY(npg_time_smooth_apply(&f, e->lambda));
     NPG_TRY(npg_parallel(measure_frames, &r, e->threads));
@@ -223,7 +226,7 @@ static npg_status smooth(npg_energy *e, size_t count)
 
 static void pull_to_pose(float *right, const npg_energy *e, size_t t)
 {
-    const float *now = e->frames[t].positions, *pose = e->given[t].positions;
+    const float *now = e->frames[t].positions, *pose = e->posed + 3 * t * e->mesh->vert_count;
     for (size_t i = 0; i < 3 * e->mesh->vert_count; i++)
         right[i] += e->system.shares[t] * e->system.ties[i / 3] * (pose[i] - now[i]);
 }
@@ -285,7 +288,6 @@ npg_status npg_energy_set(npg_energy *e, const npg_energy_frame *frames, size_t 
     frame_work r = {e, count};
     NPG_REQUIRE(e && frames && count);
     NPG_TRY(open_window(e, frames, count));
-    e->given = frames;
     NPG_TRY(smooth(e, count));
     NPG_TRY(npg_parallel(match_frames, &r, e->threads));
     set_bend(e, count);
@@ -330,7 +332,7 @@ static double pulls_at_start(const npg_energy *e, size_t t)
 static double poses_and_bend_at_start(const npg_energy *e, size_t t)
 {
     size_t row = 3 * e->mesh->vert_count;
-    const float *now = e->frames[t].positions, *pose = e->given[t].positions;
+    const float *now = e->frames[t].positions, *pose = e->posed + t * row;
     bool is_inner = t + 2 < e->system.frame_count;
     double sum = 0;
     for (size_t i = 0; i < row; i++) {
@@ -354,6 +356,6 @@ size_t npg_energy_memory(const npg_energy_settings *settings, size_t vert_count,
 {
     const size_t vector = 3 * sizeof(float);
     size_t errors = 41 * vert_count * sizeof(double);
-    return frames * vert_count * (sizeof(npg_time_quadric) + 2 * vector) + errors +
+    return frames * vert_count * (sizeof(npg_time_quadric) + sizeof(double) + 3 * vector) + errors +
            frames * (size_t)settings->points * sizeof(npg_point_pull) + vert_count * 22 * sizeof(float) * 8;
 }

@@ -12,7 +12,7 @@
  *       + sum_v sum_t tie_v share_t |x_t - y_t|^2                                poses
  *       + shape sum_t sum_(i,j) |(x_i - s_i) - (x_j - s_j)|^2                    shape
  *
- * y: the frames' own aligned poses; s: those, smoothed in time; lambda_v: how even a vertex's motion is,
+ * y: the frames' own aligned poses, bridged over holes; s: those, smoothed in time; lambda_v: how even a vertex's motion is,
  * found by cross-validation (time_smooth.c).  c_p: the closest point of the surface to the point p, n_p its
  * normal there; w_p: Geman and McClure's weight, as wide as a few times the frame's median distance.
  *
@@ -110,6 +110,17 @@ void npg_time_quadric_add(npg_time_quadric *quadric, float weight, const float n
 npg_status npg_time_smooth_choose(float *lambda, const npg_time_frames *frames,
                                   const npg_time_quadric *quadrics, const uint32_t (*edges)[2],
                                   size_t edge_count);
+
+/* Holes: around a vertex with less than half of the points that it has there in the median frame a pose is little more
+ * than a guess, and mostly one that clings to what is seen beside the hole.  There the frames before and after say where
+ * it is: the positions become
+ *
+ *     x_t + (1 - min(1, 2 q_t)^2) (z_t - x_t)        q_t: its points, of as many as usual
+ *
+ * z: the curve of least second differences through the frames of q >= 1/2; a hole at either end of the frames stays as
+ * it is, and so do fewer than NPG_TIME_SMOOTH_LEAST frames.  quadrics: T x W.  NPG_MEMORY.  Not in the paper. */
+npg_status npg_time_bridge(const npg_time_frames *frames, const npg_time_quadric *quadrics,
+                           const uint32_t (*edges)[2], size_t edge_count);
 
 /* Replace the positions by smoothed ones. */
 npg_status npg_time_smooth_apply(const npg_time_frames *frames, const float *lambda);

@@ -1,9 +1,12 @@
-/* Time smooth: banded solutions, leave-one-out errors, and the choice of lambda. */
+/* Time smooth: banded solutions, holes, leave-one-out errors, and the choice of lambda. */
 #include "optimize/energy.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "geometry/limits.h"
+#include "pipeline/order.h"
 #include "pipeline/parallel.h"
 
 #define LADDER       20   /* lambdas that are tried */
@@ -62,6 +65,11 @@ void npg_band_solve(const npg_band *b, double *x, size_t stride)
 }
 
 /* ---- one lambda ---- */
+
+static double ladder(int step)
+{
+    return pow(10, LADDER_FIRST + LADDER_STEP * step);
+}
 
 typedef struct smoother {
     npg_band band;
@@ -166,6 +174,91 @@ static void pool(double *values, double *sums, const float *degree, size_t vert_
     }
 }
 
+/* What the points around a vertex weigh: |n|^2 = 1. */
+static double weight_of(const npg_time_quadric *q)
+{
+    return (double)q->a[0] + (double)q->a[3] + (double)q->a[5];
+}
+
+static void count_neighbours(float *degree, const uint32_t (*edges)[2], size_t edge_count)
+{
+    for (size_t e = 0; e < 2 * edge_count; e++) degree[edges[e / 2][e % 2]]++;
+}
+
+/* ---- holes ---- */
+
+/* Of the points of each frame the share around each vertex, and then as a share of what is usual there. */
+static void see(double *seen, double *line, double *sums, const npg_time_frames *f,
+                const npg_time_quadric *quadrics, const float *degree, const uint32_t (*edges)[2],
+                size_t edge_count)
+{
+    size_t w = f->vert_count;
+    for (size_t t = 0; t < f->frame_count; t++) {
+        double *row = seen + t * w, all = 0;
+        for (size_t v = 0; v < w; v++) all += row[v] = weight_of(&quadrics[t * w + v]);
+        for (size_t v = 0; v < w && all > 0; v++) row[v] /= all;
+        pool(row, sums, degree, w, edges, edge_count);
+    }
+    for (size_t v = 0; v < w; v++) {
+        size_t known = 0;
+        for (size_t t = 0; t < f->frame_count; t++)
+            if (f->shares[t] > 0) line[known++] = seen[t * w + v];
+        qsort(line, known, sizeof *line, npg_order_double);
+        double usual = known ? line[known / 2] : 0;
+        for (size_t t = 0; t < f->frame_count; t++)
+            if (f->shares[t] > 0) seen[t * w + v] = usual > 0 ? seen[t * w + v] / usual : 1;
+    }
+}
+
+/* The curve through the frames that see vertex v, which gives way as little as it can, in its others between them. */
+static void bridge_vertex(smoother *s, const npg_time_frames *f, const double *seen, size_t v)
+{
+    size_t n = f->frame_count, w = f->vert_count, first = n, last = 0, knots = 0;
+    memset(s->memory, 0, 3 * n * sizeof *s->memory);
+    for (size_t t = 0; t < n; t++) {
+        bool is_knot = seen[t * w + v] >= NPG_MAJORITY;
+        if (is_knot) s->band.main[t] = (double)f->shares[t];
+        if (is_knot && !knots++) first = t;
+        if (is_knot) last = t;
+        for (size_t k = 0; k < 3; k++)
+            s->line[3 * t + k] = s->band.main[t] * (double)f->positions[3 * (t * w + v) + k];
+    }
+    if (knots == n || knots < 2) return;
+    npg_band_add_bend(&s->band, ladder(0));
+    npg_band_factor(&s->band);
+    for (size_t k = 0; k < 3; k++) npg_band_solve(&s->band, s->line + k, 3);
+    for (size_t t = first; t < last; t++) {
+        double share = fmin(1, seen[t * w + v] / NPG_MAJORITY);
+        for (size_t k = 0; k < 3; k++) {
+            float *x = &f->positions[3 * (t * w + v) + k];
+            *x += (float)((1 - share * share) * (s->line[3 * t + k] - (double)*x));
+        }
+    }
+}
+
+npg_status npg_time_bridge(const npg_time_frames *f, const npg_time_quadric *quadrics,
+                           const uint32_t (*edges)[2], size_t edge_count)
+{
+    size_t w = f->vert_count;
+    npg_arena scratch = {.purpose = NPG_FOR_FIT};
+    smoother s = {0};
+    if (f->frame_count < NPG_TIME_SMOOTH_LEAST) return NPG_OK;
+    double *seen = npg_arena_take(&scratch, f->frame_count * w, sizeof *seen);
+    double *line = npg_arena_take(&scratch, f->frame_count, sizeof *line);
+    double *sums = npg_arena_take(&scratch, w, sizeof *sums);
+    float *degree = npg_arena_take(&scratch, w, sizeof *degree);
+    npg_status status = npg_arena_status(&scratch);
+    if (!status) status = open_smoother(&s, f->frame_count);
+    if (!status) {
+        count_neighbours(degree, edges, edge_count);
+        see(seen, line, sums, f, quadrics, degree, edges, edge_count);
+        for (size_t v = 0; v < w; v++) bridge_vertex(&s, f, seen, v);
+    }
+    npg_release(&s.memory);
+    npg_arena_release(&scratch);
+    return status;
+}
+
 /* ---- choosing ---- */
 
 typedef struct choice {
@@ -177,11 +270,6 @@ typedef struct choice {
     double *errors, *fars; /* LADDER x W */
     double *here;          /* W: the points' squares without smoothing, and what may not matter */
 } choice;
-
-static double ladder(int step)
-{
-    return pow(10, LADDER_FIRST + LADDER_STEP * step);
-}
 
 static npg_status try_steps(void *user, size_t part)
 {
@@ -210,8 +298,7 @@ static void sum_here(const choice *c, double *sums)
     const npg_time_frames *f = c->frames;
     for (size_t i = 0; i < f->frame_count * f->vert_count; i++) {
         const npg_time_quadric *q = &c->quadrics[i];
-        double weight = (double)q->a[0] + (double)q->a[3] + (double)q->a[5]; /* |n|^2 = 1 */
-        c->here[i % f->vert_count] += (double)q->c + weight * FLOOR * FLOOR;
+        c->here[i % f->vert_count] += (double)q->c + weight_of(q) * FLOOR * FLOOR;
     }
     pool(c->here, sums, c->degree, f->vert_count, c->edges, c->edge_count);
 }
@@ -248,7 +335,7 @@ npg_status npg_time_smooth_choose(float *lambda, const npg_time_frames *frames,
     c.here = npg_arena_take(&scratch, w, sizeof *c.here);
     c.degree = npg_arena_take(&scratch, w, sizeof *c.degree);
     npg_status status = npg_arena_status(&scratch);
-    for (size_t e = 0; e < 2 * edge_count && !status; e++) c.degree[edges[e / 2][e % 2]]++;
+    if (!status) count_neighbours(c.degree, edges, edge_count);
     if (!status) sum_here(&c, c.errors);
     if (!status) status = npg_parallel(try_steps, &c, c.threads);
     if (!status) choose(lambda, &c);

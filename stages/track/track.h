@@ -190,7 +190,7 @@ void npg_prior_count(const npg_occlusion_prior *prior, float *since, const float
  * has other numbers for 10 and 0.08.  d: mean distance of the points from the surface in the step before, so the
  * noisier they are the more of them must agree before the surface gives way.  L: longest side of the reference
  * against that of the box of all frames.  One sensor leaves half of the body to the edges.  Samples without a
- * point within 3 w have no part; those where a sensor saw that nothing is go the shortest way out of there
+ * point within 3 w, or whose nearest is another part's, have no part; those where a sensor saw that nothing is go the shortest way out of there
  * (npg_free_space_leave()), where they are held until they have a point, and w is at least as long as that is.
  * What a fit comes to is its Chamfer distance of what can be compared; before depth images, which tell what is lost,
  *

@@ -58,6 +58,7 @@ struct npg_tracker {
     float *near_sq, *sample_pos;
     uint8_t *is_seen;  /* samples: by a sensor, in the pose at work */
     uint8_t *is_empty; /* samples: where a sensor saw that nothing is */
+    uint8_t *is_other; /* samples: the nearest target is another part's */
     way_out *outs;     /* samples */
     npg_visible visible;
     npg_occlusion_prior prior; /* edges of what no sensor sees */
@@ -154,6 +155,7 @@ static npg_status open_arrays(npg_tracker *t)
     t->sample_pos = npg_arena_take(arena, s, 3 * sizeof(float));
     t->is_seen = npg_arena_take(arena, s, 1);
     t->is_empty = npg_arena_take(arena, s, 1);
+    t->is_other = npg_arena_take(arena, s, 1);
     t->outs = npg_arena_take(arena, s, sizeof *t->outs);
     npg_visible_open(&t->visible, arena, s);
     return npg_arena_status(arena);
@@ -307,6 +309,7 @@ typedef struct step {
     const npg_tracker_cloud *cloud;
     const float *normals; /* of the points, or NULL where they have no say */
     double width, stiffness;
+    double within; /* what is farther from all points than this has none of its own */
     bool is_first, is_settling;
 } step;
 
@@ -374,7 +377,7 @@ static void set_stray(npg_block_term *term, const step *s, size_t i, pull *p, do
 static bool has_point(const step *s, size_t i, double facing)
 {
     const npg_tracker *t = s->t;
-    return t->is_seen[i] && !t->is_empty[i] && !(facing < NPG_AGAINST) &&
+    return t->is_seen[i] && !t->is_empty[i] && !t->is_other[i] && !(facing < NPG_AGAINST) &&
            (double)t->near_sq[i] <= NPG_BEYOND * NPG_BEYOND * s->width * s->width;
 }
 
@@ -487,6 +490,40 @@ static size_t grains_of(size_t count)
     return (count + GRAIN - 1) / GRAIN;
 }
 
+/* Whether a target is of another part than sample i, which it is the nearest to: at rest the place of the surface that
+ * is nearest to it (c) is farther from the sample (s) than it can be in a part that keeps its shape,
+ * |x(s) - x(c)| <= |x(s) - p| + |p - x(c)| <= 2 |x(s) - p|, and hangs on other nodes. */
+static bool is_of_other_part(const npg_tracker *t, size_t i, const npg_surface_hit *hit)
+{
+    const uint32_t *corners = t->mesh->faces + 3 * (size_t)hit->face;
+    double way[3], least = fmax(NPG_CLEARLY * sqrt((double)t->near_sq[i]), t->graph->radius);
+    for (size_t k = 0; k < 3; k++) {
+        way[k] = -(double)t->mesh->vert_pos[3 * (size_t)t->samples[i] + k];
+        for (size_t c = 0; c < 3; c++)
+            way[k] += (double)hit->weights[c] * (double)t->mesh->vert_pos[3 * (size_t)corners[c] + k];
+    }
+    return npg_vec3_dot(way, way) > least * least;
+}
+
+/* A limb that no point was seen of must not fold onto its neighbour. */
+static npg_status find_other_parts(const step *s, size_t first, size_t last)
+{
+    npg_tracker *t = s->t;
+    float targets[3 * GRAIN];
+    npg_surface_hit hits[GRAIN];
+    size_t which[GRAIN], count = 0;
+    for (size_t i = first; i < last; i++) {
+        t->is_other[i] = false;
+        if ((double)t->near_sq[i] <= s->within * s->within) continue;
+        memcpy(targets + 3 * count, s->cloud->points + 3 * (size_t)t->near[i], 3 * sizeof *targets);
+        which[count++] = i;
+    }
+    if (!count) return NPG_OK;
+    NPG_TRY(npg_surface_closest_near(t->surface, hits, targets, count, NULL, 1));
+    for (size_t k = 0; k < count; k++) t->is_other[which[k]] = is_of_other_part(t, which[k], &hits[k]);
+    return NPG_OK;
+}
+
 /* The first part makes the vertices' normals, which no pair asks for. */
 static npg_status find_pairs(void *user, size_t part)
 {
@@ -506,7 +543,8 @@ static npg_status find_pairs(void *user, size_t part)
     npg_rows_gather(place, t->vert_pos, t->samples + first, last - first);
     for (size_t i = first; i < last; i++)
         t->is_empty[i] = npg_free_space_is_empty(s->cloud->space, t->sample_pos + 3 * i);
-    return npg_kdtree_nearest(s->tree, t->near + first, t->near_sq + first, place, last - first, 1, 1);
+    NPG_TRY(npg_kdtree_nearest(s->tree, t->near + first, t->near_sq + first, place, last - first, 1, 1));
+    return find_other_parts(s, first, last);
 }
 
 static npg_status set_terms(void *user, size_t part)
@@ -597,7 +635,8 @@ static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_
     s->stiffness = s->t->settings.stiffness * pow(effort->stiffness, 1 - progress) * (1 + noise * noise);
     if (s->cloud->sensor_count == 1) s->stiffness *= ONE_SIDE;
     s->width = s->t->size * effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
-    s->width = fmax(s->width, NPG_WITHIN * tracked->point_dist_mean);
+    s->within = NPG_WITHIN * tracked->point_dist_mean;
+    s->width = fmax(s->width, s->within);
 }
 
 static npg_status do_step(step *s, npg_tracked *tracked, double *pose)

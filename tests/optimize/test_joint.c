@@ -1,5 +1,5 @@
 /* Joint fit: banded solutions, smoothing that knows noise from motion, and a moving ball whose poses are
- * wrong by noise, with one frame lost, put right by the points of all frames. */
+ * wrong by noise, with one frame lost and one with a hole, put right by the points of all frames. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -139,6 +139,34 @@ static void neighbours_carry_what_is_not_seen(void **state)
     npg_mesh_unref(&c.ball);
 }
 
+/* Where one frame has a hole, and its pose clings to what it has points of, the frames around it say where the
+ * surface is; what the frame saw stays. */
+static void holes_are_bridged(void **state)
+{
+    static capture c;
+    npg_energy_frame frames[FRAMES];
+    double off[2] = {0};
+    size_t kept = 0, in[2] = {0};
+    (void)state;
+    make_capture(&c, 0.001f, 0.001f);
+    fill_frames(frames, &c);
+    for (int i = 0; i < VERTS; i++) {
+        bool is_hole = c.ball->vert_pos[3 * i + 2] > 0.1f;
+        if (is_hole) c.pose[6][3 * i + 2] -= 0.5f * (c.ball->vert_pos[3 * i + 2] - 0.1f);
+        if (!is_hole) memcpy(c.points[6] + 3 * kept++, c.points[6] + 3 * i, 3 * sizeof(float));
+    }
+    frames[6].point_count = kept;
+    solve(&c, frames);
+    for (int i = 0; i < VERTS; i++) {
+        bool is_hole = c.ball->vert_pos[3 * i + 2] > 0.1f;
+        off[is_hole] += npg_vec3_distance(c.pose[6] + 3 * i, c.truth[6] + 3 * i);
+        in[is_hole]++;
+    }
+    print_message("in the hole: %.4f, beside it %.4f\n", off[1] / (double)in[1], off[0] / (double)in[0]);
+    assert_true(off[1] < 0.02 * (double)in[1] && off[0] < 0.02 * (double)in[0]);
+    npg_mesh_unref(&c.ball);
+}
+
 /* Poses and motion alone: their part of the gradient, difference by difference. */
 static void even_is_of_poses_and_motion(void **state)
 {
@@ -212,6 +240,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(band_solves),
                                        cmocka_unit_test(smoothing_follows_the_noise),
                                        cmocka_unit_test(neighbours_carry_what_is_not_seen),
+                                       cmocka_unit_test(holes_are_bridged),
                                        cmocka_unit_test(even_is_of_poses_and_motion),
                                        cmocka_unit_test(equal_input_gives_equal_bits),
                                        cmocka_unit_test(short_windows_work)};

@@ -1,5 +1,5 @@
 /* Tracker: a fine reference is aligned by few of its vertices, and all of them move; a piece without points
- * goes with the one beside it. */
+ * goes with the one beside it, and is not drawn to points of another part. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -127,6 +127,59 @@ static void a_piece_without_points_goes_along(void **state)
     npg_mesh_unref(&both);
 }
 
+/* A rod along z, bent into two arms that stand beside each other: the place of one that was at (x, y, z). */
+static void bend_rod(float place[3])
+{
+    const double radius = 0.3, bow = M_PI / 2 * radius, x = (double)place[0], s = (double)place[2];
+    double turn = fmax(-M_PI / 2, fmin(M_PI / 2, s / radius)), arm = fmax(0, fabs(s) - bow);
+    place[0] = (float)((radius + x) * sin(turn));
+    place[2] = (float)(arm - (radius + x) * cos(turn));
+}
+
+/* An arm that has come close to the other one, and that no point was seen of, is not drawn to the other's points. */
+static void a_part_without_points_is_not_drawn_to_another(void **state)
+{
+    static const npg_tracker_settings settings = {200, 1500, 12, 1e-6, 0.001};
+    npg_mesh *rod = ball_mesh(80, 24);
+    size_t v = rod->vert_count, count = 0, arm = 0;
+    npg_tracker *tracker;
+    npg_tracked tracked;
+    float *placed, *points, *found;
+    double *pose, moved = 0;
+    (void)state;
+    for (size_t i = 0; i < 3 * v; i++) rod->vert_pos[i] *= i % 3 == 2 ? 2 : 0.2F;
+    for (size_t i = 0; i < v; i++) bend_rod(rod->vert_pos + 3 * i);
+    assert_int_equal(npg_tracker_open(&tracker, rod, &settings), NPG_OK);
+    const npg_graph *graph = npg_tracker_graph(tracker);
+    assert_int_equal(npg_alloc_array(&placed, NPG_FOR_RUN, v, 3 * sizeof(float)), NPG_OK);
+    assert_int_equal(npg_alloc_array(&points, NPG_FOR_RUN, v, 3 * sizeof(float)), NPG_OK);
+    assert_int_equal(npg_alloc_array(&found, NPG_FOR_RUN, v, 3 * sizeof(float)), NPG_OK);
+    assert_int_equal(npg_alloc_array(&pose, NPG_FOR_RUN, graph->node_count, NPG_POSE_SIZE * sizeof(double)),
+                     NPG_OK);
+    npg_pose_rest(pose, graph->node_count);
+    for (size_t k = 0; k < graph->node_count; k++) /* the arms, 0.6 apart, come to 0.26 */
+        pose[k * NPG_POSE_SIZE + 9] = 0.17 * fmax(-1, fmin(1, (double)graph->node_pos[3 * k] / -0.3));
+    npg_tracker_vertices(tracker, placed, pose);
+    for (size_t i = 0; i < v; i++)
+        if (rod->vert_pos[3 * i] < 0) memcpy(points + 3 * count++, placed + 3 * i, 3 * sizeof(float));
+    const npg_tracker_cloud cloud = {.points = points, .count = count};
+    assert_int_equal(npg_tracker_fit(tracker, &tracked, pose, &cloud, NULL, NULL), NPG_OK);
+    npg_tracker_vertices(tracker, found, pose);
+    for (size_t i = 0; i < v; i++) {
+        if (rod->vert_pos[3 * i] < 0.2F || rod->vert_pos[3 * i + 2] < 0.1F) continue;
+        moved += (double)placed[3 * i] - (double)found[3 * i];
+        arm++;
+    }
+    print_message("the arm without points came nearer by %.4f\n", moved / (double)arm);
+    assert_true(arm && moved < 0.01 * (double)arm);
+    npg_release(&placed);
+    npg_release(&points);
+    npg_release(&found);
+    npg_release(&pose);
+    npg_tracker_close(&tracker);
+    npg_mesh_unref(&rod);
+}
+
 enum { SIDE = 60 }; /* cells of an image */
 
 /* How far the second ball moves towards the first, of which alone there are points, in three fits. */
@@ -227,6 +280,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_piece_without_points_goes_along),
+        cmocka_unit_test(a_part_without_points_is_not_drawn_to_another),
         cmocka_unit_test(surface_where_nothing_is_is_pulled_out),
         cmocka_unit_test(what_has_left_empty_space_stays_out),
         cmocka_unit_test(thin_meshes_are_made_of_the_whole_one_s_vertices),
