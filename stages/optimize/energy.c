@@ -36,6 +36,7 @@ struct npg_energy {
     npg_time_quadric *quadrics; /* T x W: what the points say of the frames as they came */
     npg_energy_system system;   /* its arrays, too */
     double noise, lambda_median;
+    bool is_of_sensors; /* a frame of the window */
 };
 
 void npg_energy_close(npg_energy **slot)
@@ -87,6 +88,7 @@ static npg_status open_window(npg_energy *e, const npg_energy_frame *frames, siz
     size_t w = e->mesh->vert_count, most = (size_t)e->settings.points;
     npg_arena *a = &e->window;
     npg_arena_release(a);
+    e->is_of_sensors = false;
     e->positions = npg_arena_take(a, count * w, 3 * sizeof(float));
     e->posed = npg_arena_take(a, count * w, 3 * sizeof(float));
     e->lambda = npg_arena_take(a, w, sizeof(float));
@@ -112,6 +114,7 @@ static npg_status open_window(npg_energy *e, const npg_energy_frame *frames, siz
         e->frames[t].positions = e->positions + t * w * 3;
         memcpy(e->frames[t].positions, frames[t].positions, w * 3 * sizeof(float));
         e->is_known[t] = frames[t].is_known;
+        e->is_of_sensors |= frames[t].is_of_sensors;
     }
     return NPG_OK;
 }
@@ -212,7 +215,7 @@ static npg_status smooth(npg_energy *e, size_t count)
     NPG_TRY(weigh_frames(e, count));
     NPG_TRY(npg_parallel(match_frames, &r, e->threads));
     NPG_TRY(npg_parallel(gather_quadrics, &r, e->threads));
-    NPG_TRY(npg_time_bridge(&f, e->quadrics, edges, e->edge_count));
+    if (!e->is_of_sensors) NPG_TRY(npg_time_bridge(&f, e->quadrics, edges, e->edge_count));
     memcpy(e->posed, e->positions, 3 * count * e->mesh->vert_count * sizeof *e->posed);
     NPG_TRY(npg_time_smooth_choose(e->lambda, &f, e->quadrics, edges, e->edge_count));
     e->lambda_median = lambda_median(e);

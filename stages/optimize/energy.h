@@ -39,6 +39,7 @@ typedef struct npg_energy_frame {
     const float *points, *normals;
     size_t point_count;
     bool is_known;
+    bool is_of_sensors; /* whose places are known: what has no points may be hidden, and is held already */
 } npg_energy_frame;
 
 typedef struct npg_energy npg_energy;

@@ -107,8 +107,12 @@ static npg_status set_energy(npg_window_solver *s, npg_held *const *held)
         const npg_solver_frame *frame = &s->frames[t];
         float *before = s->before + t * s->size;
         npg_proxy_gather(s->surface, before, frame->solved ? frame->solved : held[t]->frame.vert_unit);
-        s->posed[t] = (npg_energy_frame){before, frame->points, frame->normals, frame->point_count,
-                                         frame->solved != NULL};
+        s->posed[t] = (npg_energy_frame){before,
+                                         frame->points,
+                                         frame->normals,
+                                         frame->point_count,
+                                         frame->solved != NULL,
+                                         held[t]->frame.sensor_count > 0};
     }
     return npg_energy_set(s->energy, s->posed, s->count);
 }

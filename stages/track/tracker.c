@@ -505,7 +505,7 @@ static bool is_of_other_part(const npg_tracker *t, size_t i, const npg_surface_h
     return npg_vec3_dot(way, way) > least * least;
 }
 
-/* A limb that no point was seen of must not fold onto its neighbour. */
+/* A limb that no point was seen of must not fold onto its neighbour.  Where sensors are known, is_seen tells. */
 static npg_status find_other_parts(const step *s, size_t first, size_t last)
 {
     npg_tracker *t = s->t;
@@ -514,7 +514,7 @@ static npg_status find_other_parts(const step *s, size_t first, size_t last)
     size_t which[GRAIN], count = 0;
     for (size_t i = first; i < last; i++) {
         t->is_other[i] = false;
-        if ((double)t->near_sq[i] <= s->within * s->within) continue;
+        if (s->cloud->sensor_count || (double)t->near_sq[i] <= s->within * s->within) continue;
         memcpy(targets + 3 * count, s->cloud->points + 3 * (size_t)t->near[i], 3 * sizeof *targets);
         which[count++] = i;
     }
