@@ -42,6 +42,7 @@ struct npg_tracker {
     npg_surface *surface;
     float *vert_pos, *vert_normals; /* W x 3: the pose at work */
     uint32_t *samples;              /* vertices, spread over the surface */
+    uint32_t *sample_face;          /* of each a face */
     size_t sample_count;
     double *step;       /* K x 6 */
     float *rows;        /* K x 16: the pose at work, for many points */
@@ -119,8 +120,11 @@ static npg_status choose_samples(npg_tracker *t)
     size_t step = t->mesh->vert_count / t->settings.samples + 1;
     t->sample_count = (t->mesh->vert_count + step - 1) / step;
     t->samples = npg_arena_take(&t->arena, t->sample_count, sizeof *t->samples);
+    t->sample_face = npg_arena_take(&t->arena, t->sample_count, sizeof *t->sample_face);
     NPG_TRY(npg_arena_status(&t->arena));
     for (size_t s = 0; s < t->sample_count; s++) t->samples[s] = (uint32_t)(s * step);
+    for (size_t i = 0; i < 3 * t->mesh->face_count; i++)
+        if (t->mesh->faces[i] % step == 0) t->sample_face[t->mesh->faces[i] / step] = (uint32_t)(i / 3);
     return NPG_OK;
 }
 
@@ -511,15 +515,18 @@ static npg_status find_other_parts(const step *s, size_t first, size_t last)
     npg_tracker *t = s->t;
     float targets[3 * GRAIN];
     npg_surface_hit hits[GRAIN];
+    uint32_t start_face[GRAIN];
     size_t which[GRAIN], count = 0;
     for (size_t i = first; i < last; i++) {
         t->is_other[i] = false;
-        if (s->cloud->sensor_count || (double)t->near_sq[i] <= s->within * s->within) continue;
+        double away = sqrt((double)t->near_sq[i]);
+        if (s->cloud->sensor_count || away <= s->within || away > NPG_BEYOND * s->width) continue;
         memcpy(targets + 3 * count, s->cloud->points + 3 * (size_t)t->near[i], 3 * sizeof *targets);
+        start_face[count] = t->sample_face[i];
         which[count++] = i;
     }
     if (!count) return NPG_OK;
-    NPG_TRY(npg_surface_closest_near(t->surface, hits, targets, count, NULL, 1));
+    NPG_TRY(npg_surface_closest_near(t->surface, hits, targets, count, start_face, 1));
     for (size_t k = 0; k < count; k++) t->is_other[which[k]] = is_of_other_part(t, which[k], &hits[k]);
     return NPG_OK;
 }
