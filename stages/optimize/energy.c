@@ -35,7 +35,7 @@ struct npg_energy {
     npg_energy_frame *frames;   /* T, on `positions` */
     npg_time_quadric *quadrics; /* T x W: what the points say of the frames as they came */
     npg_energy_system system;   /* its arrays, too */
-    double noise, lambda_median;
+    double noise, lambda_median, bridged;
     bool is_of_sensors; /* a frame of the window */
 };
 
@@ -89,6 +89,7 @@ static npg_status open_window(npg_energy *e, const npg_energy_frame *frames, siz
     npg_arena *a = &e->window;
     npg_arena_release(a);
     e->is_of_sensors = false;
+    e->bridged = 0;
     e->positions = npg_arena_take(a, count * w, 3 * sizeof(float));
     e->posed = npg_arena_take(a, count * w, 3 * sizeof(float));
     e->lambda = npg_arena_take(a, w, sizeof(float));
@@ -215,7 +216,7 @@ static npg_status smooth(npg_energy *e, size_t count)
     NPG_TRY(weigh_frames(e, count));
     NPG_TRY(npg_parallel(match_frames, &r, e->threads));
     NPG_TRY(npg_parallel(gather_quadrics, &r, e->threads));
-    if (!e->is_of_sensors) NPG_TRY(npg_time_bridge(&f, e->quadrics, edges, e->edge_count));
+    if (!e->is_of_sensors) NPG_TRY(npg_time_bridge(&f, &e->bridged, e->quadrics, edges, e->edge_count));
     memcpy(e->posed, e->positions, 3 * count * e->mesh->vert_count * sizeof *e->posed);
     NPG_TRY(npg_time_smooth_choose(e->lambda, &f, e->quadrics, edges, e->edge_count));
     e->lambda_median = lambda_median(e);
@@ -310,6 +311,11 @@ double npg_energy_noise(const npg_energy *e)
 double npg_energy_lambda(const npg_energy *e)
 {
     return e->lambda_median;
+}
+
+double npg_energy_bridged(const npg_energy *e)
+{
+    return e->bridged;
 }
 
 npg_energy_system *npg_energy_system_of(npg_energy *e)

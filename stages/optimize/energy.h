@@ -60,6 +60,7 @@ npg_status npg_energy_set(npg_energy *energy, const npg_energy_frame *frames, si
 /* Of the frames that were set: s (T x W x 3), median of lambda, and A and r. */
 const float *npg_energy_smoothed(const npg_energy *energy);
 double npg_energy_lambda(const npg_energy *energy);
+double npg_energy_bridged(const npg_energy *energy); /* of npg_time_bridge() */
 struct npg_energy_system *npg_energy_system_of(npg_energy *energy);
 
 /* E(s). */
@@ -119,8 +120,9 @@ npg_status npg_time_smooth_choose(float *lambda, const npg_time_frames *frames,
  *     x_t + (1 - min(1, 2 q_t)^2) (z_t - x_t)        q_t: its points, of as many as usual
  *
  * z: the curve of least second differences through the frames of q >= 1/2; a hole at either end of the frames stays as
- * it is, and so do fewer than NPG_TIME_SMOOTH_LEAST frames.  quadrics: T x W.  NPG_MEMORY.  Not in the paper. */
-npg_status npg_time_bridge(const npg_time_frames *frames, const npg_time_quadric *quadrics,
+ * it is, and so do fewer than NPG_TIME_SMOOTH_LEAST frames.  quadrics: T x W; *share: of all positions those that were
+ * bridged.  NPG_MEMORY.  Not in the paper. */
+npg_status npg_time_bridge(const npg_time_frames *frames, double *share, const npg_time_quadric *quadrics,
                            const uint32_t (*edges)[2], size_t edge_count);
 
 /* Replace the positions by smoothed ones. */

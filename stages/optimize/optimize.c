@@ -259,6 +259,11 @@ static void note_result(npg_worker *worker)
     else
         npg_worker_log(worker, NPG_LOG_INFO, -1, "window %lld: Chamfer distance %.4g, edges changed by %.4g",
                        (long long)s->hand.window_at, r->solved.distance, r->solved.isometry);
+    if (r->bridged > NPG_FEW)
+        npg_worker_log(
+            worker, NPG_LOG_INFO, -1,
+            "window %lld: %.0f %% of the surface has no points in its frame: the frames around say where it is",
+            (long long)s->hand.window_at, 100 * r->bridged);
 }
 
 static npg_status solve_window(npg_worker *worker)

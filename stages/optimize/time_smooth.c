@@ -210,8 +210,9 @@ static void see(double *seen, double *line, double *sums, const npg_time_frames 
     }
 }
 
-/* The curve through the frames that see vertex v, which gives way as little as it can, in its others between them. */
-static void bridge_vertex(smoother *s, const npg_time_frames *f, const double *seen, size_t v)
+/* The curve through the frames that see vertex v, which bends as little as it can, in its others between them; returns how
+ * many these are. */
+static size_t bridge_vertex(smoother *s, const npg_time_frames *f, const double *seen, size_t v)
 {
     size_t n = f->frame_count, w = f->vert_count, first = n, last = 0, knots = 0;
     memset(s->memory, 0, 3 * n * sizeof *s->memory);
@@ -223,7 +224,7 @@ static void bridge_vertex(smoother *s, const npg_time_frames *f, const double *s
         for (size_t k = 0; k < 3; k++)
             s->line[3 * t + k] = s->band.main[t] * (double)f->positions[3 * (t * w + v) + k];
     }
-    if (knots == n || knots < 2) return;
+    if (knots == n || knots < 2) return 0;
     npg_band_add_bend(&s->band, ladder(0));
     npg_band_factor(&s->band);
     for (size_t k = 0; k < 3; k++) npg_band_solve(&s->band, s->line + k, 3);
@@ -234,14 +235,16 @@ static void bridge_vertex(smoother *s, const npg_time_frames *f, const double *s
             *x += (float)((1 - share * share) * (s->line[3 * t + k] - (double)*x));
         }
     }
+    return last - first + 1 - knots;
 }
 
-npg_status npg_time_bridge(const npg_time_frames *f, const npg_time_quadric *quadrics,
+npg_status npg_time_bridge(const npg_time_frames *f, double *share, const npg_time_quadric *quadrics,
                            const uint32_t (*edges)[2], size_t edge_count)
 {
     size_t w = f->vert_count;
     npg_arena scratch = {.purpose = NPG_FOR_FIT};
     smoother s = {0};
+    *share = 0;
     if (f->frame_count < NPG_TIME_SMOOTH_LEAST) return NPG_OK;
     double *seen = npg_arena_take(&scratch, f->frame_count * w, sizeof *seen);
     double *line = npg_arena_take(&scratch, f->frame_count, sizeof *line);
@@ -252,7 +255,8 @@ npg_status npg_time_bridge(const npg_time_frames *f, const npg_time_quadric *qua
     if (!status) {
         count_neighbours(degree, edges, edge_count);
         see(seen, line, sums, f, quadrics, degree, edges, edge_count);
-        for (size_t v = 0; v < w; v++) bridge_vertex(&s, f, seen, v);
+        for (size_t v = 0; v < w; v++)
+            *share += (double)bridge_vertex(&s, f, seen, v) / (double)(f->frame_count * w);
     }
     npg_release(&s.memory);
     npg_arena_release(&scratch);

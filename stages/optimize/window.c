@@ -209,6 +209,7 @@ npg_status npg_window_solve(npg_window_solver *s, npg_window_result *result, npg
     if (!status) status = s->row->solve(s->solver, &result->solved, &problem, watch, user);
     if (!status) status = keep(s, result, held, window);
     if (s->energy) result->noise = npg_energy_noise(s->energy);
+    if (s->energy) result->bridged = npg_energy_bridged(s->energy);
     npg_arena_release(&s->window);
     return status;
 }

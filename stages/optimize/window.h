@@ -24,6 +24,8 @@ typedef struct npg_window_result {
         noise; /* median distance of points from the smoothed poses, as a standard deviation; 0 without poses */
     double
         moved; /* mean way of a vertex from its pose                                                          */
+    double
+        bridged; /* share of the surface that had no points in its frame and went where the frames around it say */
 } npg_window_result;
 
 typedef struct npg_window_solver npg_window_solver;
