@@ -110,7 +110,7 @@ check_killed() {
     for missing in hold skip; do
         check_killed gaps "0 2" "${open[@]}" --method '{"follow-settle": 0}' --keep-going --missing $missing
     done
-    check_killed gaps "0" "${open[@]}" --look-ahead 4 --method '{"follow-settle": 0, "window": 3}' --keep-going --missing skip --frames 1::2
+    check_killed gaps "0" "${open[@]}" --look-ahead 4 --method '{"follow-settle": 0, "window": 3, "epochs": 400}' --keep-going --missing skip --frames 1::2
 }
 
 @test "without alignment it is killed inside a window" {
