@@ -12,8 +12,8 @@
  *       + sum_v sum_t tie_v share_t |x_t - y_t|^2                                poses
  *       + shape sum_t sum_(i,j) |(x_i - s_i) - (x_j - s_j)|^2                    shape
  *
- * y: the frames' own aligned poses, bridged over holes; s: those, smoothed in time; lambda_v: how even a vertex's motion is,
- * found by cross-validation (time_smooth.c).  c_p: the closest point of the surface to the point p, n_p its
+ * y: the frames' own aligned poses, bridged over holes; s: those, smoothed in time; lambda_v: how even a vertex's
+ * motion is, found by cross-validation (time_smooth.c).  c_p: the closest point of the surface to the point p, n_p its
  * normal there; w_p: Geman and McClure's weight, as wide as a few times the frame's median distance.
  *
  *     tie_v = e (least + trust / (1 + lambda_v median(lambda) / even^2))          c = e + tie_v

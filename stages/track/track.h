@@ -190,9 +190,9 @@ void npg_prior_count(const npg_occlusion_prior *prior, float *since, const float
  * has other numbers for 10 and 0.08.  d: mean distance of the points from the surface in the step before, so the
  * noisier they are the more of them must agree before the surface gives way.  L: longest side of the reference
  * against that of the box of all frames.  One sensor leaves half of the body to the edges.  Samples without a
- * point within 3 w, or whose nearest is another part's, have no part; those where a sensor saw that nothing is go the shortest way out of there
- * (npg_free_space_leave()), where they are held until they have a point, and w is at least as long as that is.
- * What a fit comes to is its Chamfer distance of what can be compared; before depth images, which tell what is lost,
+ * point within 3 w, or whose nearest is another part's, have no part; those where a sensor saw that nothing is
+ * go the shortest way out of there (npg_free_space_leave()), where they are held until they have a point, and w is
+ * at least as long as that is.  What a fit comes to is its Chamfer distance of what can be compared; before images
  *
  *     cost = mean_p min(d_p^2, tau^2) / tau^2 + mean_s min(d_s^2, tau^2) / tau^2
  *
