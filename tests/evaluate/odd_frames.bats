@@ -1,6 +1,8 @@
 # Frames that are bad beside the others of their capture, each by itself: named in the report, in frames.jsonl and in the last
 # line, with exit code 7.
 
+load ../support/store
+
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG-bodies" --body bar --frames 12 --points 800 --cycles 0.3 --no-normals --format obj -o bar >synth.log
@@ -74,15 +76,8 @@ bad_frames() {
     run_it 7 again "${small[@]}" --bars residual=1
     cp again-out/frames.jsonl whole.jsonl
     tail -n 1 again.log >whole.line
-    for _ in 1 2 3 4 5; do # it may be done before a busy machine has killed it, for all that there are many windows
-        rm -r again-out
-        "$NEUPIG" run again -o again-out "${small[@]}" --bars residual=1 >again.log 2>&1 &
-        pid=$!
-        while kill -0 $pid 2>/dev/null && ! grep -qs '"index":2' again-out/frames.partial.jsonl; do sleep 0.005; done
-        kill -KILL $pid 2>/dev/null || true
-        wait $pid || true
-        [ -e again-out/done.json ] || break
-    done
+    rm -r again-out
+    killed_at state:3 "$NEUPIG" run again -o again-out "${small[@]}" --bars residual=1 >again.log 2>&1
     run_it 7 again "${small[@]}" --bars residual=1
     grep -q resumed_frames again-out/report.json
     cmp whole.jsonl again-out/frames.jsonl

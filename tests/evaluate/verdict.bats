@@ -98,12 +98,7 @@ lumpy() {
 }
 
 @test "a run that is killed resumes to the same figures" {
-    "$NEUPIG" run one/points -o killed --unseen keep "${small[@]}" >killed.log 2>&1 &
-    pid=$!
-    while kill -0 $pid 2>/dev/null && [ "$(records killed)" -eq 0 ]; do sleep 0.02; done
-    kill -KILL $pid 2>/dev/null
-    wait $pid || true
-    [ ! -e killed/done.json ]
+    killed_at state:0 "$NEUPIG" run one/points -o killed --unseen keep "${small[@]}" >killed.log 2>&1
     run "$NEUPIG" run one/points -o killed --unseen keep "${small[@]}"
     echo "$output"
     [ "$status" -eq 7 ]

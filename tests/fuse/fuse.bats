@@ -89,12 +89,7 @@ better() {
 # Kill a run into $1 in its solving pass, once it has a state.
 kill_in_solving() {
     rm -rf "$1"
-    "$NEUPIG" run noisy/points -o "$1" "${small[@]}" >"$1.log" 2>&1 &
-    local pid=$!
-    while kill -0 $pid 2>/dev/null && [ "$(records "$1")" -eq 0 ]; do sleep 0.02; done
-    kill -KILL $pid 2>/dev/null
-    wait $pid || true
-    [ ! -e "$1/done.json" ]
+    killed_at state:0 "$NEUPIG" run noisy/points -o "$1" "${small[@]}" >"$1.log" 2>&1
 }
 
 same() {
@@ -176,11 +171,7 @@ kill_in_fusing() {
 @test "a run that starts over and is killed while it gathers leaves the unfinished job as it was" {
     [ -d hurt ] || skip "needs the job that the test before left"
     cp -r hurt again
-    "$NEUPIG" run noisy/points -o again "${small[@]}" --restart --method '{"align-steps": 200, "align-nodes": 500}' >again.log 2>&1 &
-    local pid=$!
-    while kill -0 $pid 2>/dev/null && ! grep -qs NPGREC01pose again/job/store.new; do sleep 0.02; done
-    kill -KILL $pid
-    wait $pid || true
+    killed_at pose:0 "$NEUPIG" run noisy/points -o again "${small[@]}" --restart --method '{"align-steps": 200, "align-nodes": 500}' >again.log 2>&1
     [ -e again/job/store.new ]
     "$NEUPIG" run noisy/points -o again "${small[@]}" --quiet
     grep -q resumed_frames again/report.json

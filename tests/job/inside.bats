@@ -64,12 +64,7 @@ check_killed() {
 @test "windows of grids over aligned poses that are killed inside give the same bytes" {
     "$NEUPIG" run capture/points -o grids-whole "${small[@]}" "${grids[@]}" >grids.log
     for state in 0 1; do
-        "$NEUPIG" run capture/points -o grids "${small[@]}" "${grids[@]}" >grids.log 2>&1 &
-        local pid=$! at
-        until at=$(newest_state grids) && [ "${at:--1}" -ge $state ]; do kill -0 $pid; done
-        kill -KILL $pid
-        wait $pid || true
-        [ ! -e grids/done.json ]
+        killed_at state:$state "$NEUPIG" run capture/points -o grids "${small[@]}" "${grids[@]}" >grids.log 2>&1
     done
     "$NEUPIG" run capture/points -o grids "${small[@]}" "${grids[@]}"
     grep -q resumed_frames grids/report.json

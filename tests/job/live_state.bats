@@ -20,19 +20,6 @@ setup() {
     cd "$BATS_FILE_TMPDIR"
 }
 
-# Kill the run of process $3 into $1 once it has written state $2 (from 0 on).
-kill_at_state() {
-    local at
-    while kill -0 "$3" 2>/dev/null; do
-        at=$(newest_state "$1")
-        [ -z "$at" ] || [ "$at" -lt "$2" ] || break
-        sleep 0.02
-    done
-    kill -KILL "$3" 2>/dev/null || true
-    wait "$3" || true
-    [ ! -e "$1/done.json" ]
-}
-
 # What the run into $2 has must be that of $1, byte by byte, but for the folder that the frames lay in.
 same() {
     cmp "$1/reference.ply" "$2/reference.ply"
@@ -41,25 +28,14 @@ same() {
     diff -r "$1/meshes" "$2/meshes"
 }
 
-# A run over folder $1 that is killed at the states $2; then its options.  Fails where it was done before.
-kill_at_states() {
-    local folder=$1 states=$2 state
-    shift 2
-    rm -rf killed
-    for state in $states; do
-        "$NEUPIG" run --follow "$folder" -o killed "${small[@]}" "$@" >killed.log 2>&1 &
-        kill_at_state killed "$state" $! || return 1
-    done
-}
-
 # A run over folder $1, left alone, and one that is killed at the states $2; then their options.
 check_killed() {
-    local folder=$1 states=$2 wanted=0 status=0
+    local folder=$1 states=$2 state wanted=0 status=0
     shift 2
-    rm -rf left
+    rm -rf left killed
     "$NEUPIG" run --follow "$folder" -o left "${small[@]}" "$@" >left.log 2>&1 || wanted=$?
-    for _ in 1 2 3 4 5; do # a busy machine may come too late
-        ! kill_at_states "$folder" "$states" "$@" || break
+    for state in $states; do
+        killed_at "state:$state" "$NEUPIG" run --follow "$folder" -o killed "${small[@]}" "$@" >killed.log 2>&1
     done
     "$NEUPIG" run --follow "$folder" -o killed "${small[@]}" "$@" >killed.log 2>&1 || status=$?
     cat killed.log
@@ -75,8 +51,7 @@ check_killed() {
         set -- $step
         for file in $(ls capture/points | head -"$1" | tail -n +$((fed + 1))); do cp "capture/points/$file" grows; done
         fed=$1
-        "$NEUPIG" run --follow grows -o grown "${small[@]}" "${open[@]}" >grown.log 2>&1 &
-        kill_at_state grown "$2" $!
+        killed_at state:$2 "$NEUPIG" run --follow grows -o grown "${small[@]}" "${open[@]}" >grown.log 2>&1
         mkdir -p before && cp -n grown/meshes/*.ply before/ 2>/dev/null || true
     done
     [ "$(ls before | wc -l)" -ge 4 ]
@@ -110,24 +85,15 @@ check_killed() {
     for missing in hold skip; do
         check_killed gaps "0 2" "${open[@]}" --method '{"follow-settle": 0}' --keep-going --missing $missing
     done
-    check_killed gaps "0" "${open[@]}" --look-ahead 4 --method '{"follow-settle": 0, "window": 3, "epochs": 400}' --keep-going --missing skip --frames 1::2
+    check_killed gaps "0" "${open[@]}" --look-ahead 4 --method '{"follow-settle": 0, "window": 3}' --keep-going --missing skip --frames 1::2
 }
 
 @test "without alignment it is killed inside a window" {
     local free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 16000}')
     rm -rf left killed
     "$NEUPIG" run --follow all -o left "${small[@]}" "${open[@]}" "${free[@]}" >left.log
-    for place in 1 2; do
-        "$NEUPIG" run --follow all -o killed "${small[@]}" "${open[@]}" "${free[@]}" >killed.log 2>&1 &
-        local pid=$!
-        # in the first window, then in the second
-        until [ "$(records killed inside)" -gt 0 ] && [ "$(newest_state killed)" = "${next:-}" ]; do
-            kill -0 $pid
-            sleep 0.01
-        done
-        kill -KILL $pid
-        wait $pid || true
-        local next=0
+    for window in -1 0; do # in the first window, then in the second
+        killed_at inside:$window "$NEUPIG" run --follow all -o killed "${small[@]}" "${open[@]}" "${free[@]}" >killed.log 2>&1
     done
     "$NEUPIG" run --follow all -o killed "${small[@]}" "${open[@]}" "${free[@]}"
     grep -q '"resumed_frames": [1-9]' killed/report.json
@@ -135,8 +101,7 @@ check_killed() {
 }
 
 @test "a stream that begins again is compared and goes on; another one is refused" {
-    "$NEUPIG" run - -o streamed "${small[@]}" "${open[@]}" <stream >streamed.log 2>&1 &
-    kill_at_state streamed 1 $!
+    killed_at state:1 "$NEUPIG" run - -o streamed "${small[@]}" "${open[@]}" <stream >streamed.log 2>&1
     cp -r streamed other
     "$NEUPIG" run - -o streamed "${small[@]}" "${open[@]}" <stream
     grep -q '"resumed_frames": [1-9]' streamed/report.json
@@ -164,9 +129,7 @@ check_killed() {
     local far=(--method '{"window": 4, "overlap": 2}' --look-ahead 12 --keyframe 9 --follow-end 0) # frame 0 is solved in window 4
     "$NEUPIG" run --follow all -o far "${small[@]}" "${far[@]}" >far.log
     cp -r capture/points changing
-    "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" >change.log 2>&1 &
-    kill_at_state change 0 $!
-    [ "$(newest_state change)" -lt 4 ]
+    killed_at state:0 "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" >change.log 2>&1
     : >changing/capture.end
     run "$NEUPIG" run --follow changing -o change "${small[@]}" "${far[@]}" --method '{"epochs": 3}'
     echo "$output"
@@ -195,16 +158,14 @@ check_killed() {
 }
 
 @test "append brings a followed folder that was broken off to its end" {
-    "$NEUPIG" run --follow all -o ended "${small[@]}" "${open[@]}" >ended.log 2>&1 &
-    kill_at_state ended 1 $!
+    killed_at state:1 "$NEUPIG" run --follow all -o ended "${small[@]}" "${open[@]}" >ended.log 2>&1
     run "$NEUPIG" append ended -q
     [ "$status" -eq 2 ]
     same whole ended
 }
 
 @test "damaged frames that came are said, and the job starts over" {
-    "$NEUPIG" run --follow all -o hurt "${small[@]}" "${open[@]}" >hurt.log 2>&1 &
-    kill_at_state hurt 0 $!
+    killed_at state:0 "$NEUPIG" run --follow all -o hurt "${small[@]}" "${open[@]}" >hurt.log 2>&1
     printf x | dd of=hurt/job/frames.npg bs=1 seek=$(($(grep -abo NPGREC01frame hurt/job/frames.npg | sed -n 2p | cut -d: -f1) + 100)) \
         conv=notrunc status=none
     rm -rf hurt/meshes

@@ -21,19 +21,12 @@ setup() {
     cd "$BATS_FILE_TMPDIR"
 }
 
-# Start a run of $input into $1 and kill it with signal $2 once it has $3 states; the arguments after that are its options.
+# A run of $input into $1 that gets signal $2 once it has $3 states; the arguments after that are its options.
 kill_at() {
     local out=$1 signal=$2 states=$3
     shift 3
     rm -rf "$out"
-    "$NEUPIG" run "${input:-capture/points}" -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1 &
-    local pid=$!
-    while kill -0 $pid 2>/dev/null && [ "$(records "$out")" -lt "$states" ]; do
-        sleep 0.02
-    done
-    kill "-$signal" $pid 2>/dev/null || true
-    killed_status=0
-    wait $pid || killed_status=$?
+    signalled_at "$signal" state:$((states - 1)) "$NEUPIG" run "${input:-capture/points}" -o "$out" "${small[@]}" "$@" >"$out.log" 2>&1
 }
 
 go_on() {

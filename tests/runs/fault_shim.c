@@ -5,6 +5,9 @@
  *                              SYNC: the N-th fsync has EIO; RENAME: the N-th rename has EIO
  *     NPG_FAULT_UNDER=DIR      absolute; only files in this folder count
  *     NPG_FAULT_MARK=FILE      appears once the fault has happened
+ *     NPG_FAULT_SIGNAL=NUMBER:KIND:INDEX
+ *                              the process gets this signal, once, behind the first record of this kind, of this index
+ *                              or a later one, that it has written into a store (pipeline/store.h)
  *     NPG_FAULT_CLOCK=SECONDS  the calendar clock jumps by this much to and fro with every look at it
  *     NPG_FAULT_KERNEL=A=>B    in the OpenCL sources that are built, A is B
  *     NPG_FAULT_DRIVER=WORDS   the OpenCL driver says these when it is first asked, and aborts
@@ -12,7 +15,9 @@
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdatomic.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -102,10 +107,31 @@ ssize_t writev(int fd, const struct iovec *parts, int count)
                : syscall(SYS_writev, fd, parts, count);
 }
 
+/* A record's head is written last: the record that it begins is whole. */
+static void signal_behind(const void *data, size_t size)
+{
+    static _Atomic int is_done;
+    struct {
+        char magic[8], kind[8];
+        int64_t index;
+    } head;
+    char wanted[8];
+    int number;
+    long index;
+    const char *order = getenv("NPG_FAULT_SIGNAL");
+    if (!order || size < sizeof head || sscanf(order, "%d:%7[^:]:%ld", &number, wanted, &index) != 3) return;
+    memcpy(&head, data, sizeof head);
+    if (!memcmp(head.magic, "NPGREC01", sizeof head.magic) && !strncmp(head.kind, wanted, sizeof head.kind) &&
+        head.index >= index && !atomic_exchange(&is_done, 1))
+        kill(getpid(), number);
+}
+
 ssize_t pwrite(int fd, const void *data, size_t size, off_t place)
 {
     ssize_t now = allowed(fd, size);
-    return now < 0 ? -1 : syscall(SYS_pwrite64, fd, data, (size_t)now, place);
+    if (now >= 0) now = syscall(SYS_pwrite64, fd, data, (size_t)now, place);
+    signal_behind(data, now < 0 ? 0 : (size_t)now);
+    return now;
 }
 
 ssize_t pwrite64(int fd, const void *data, size_t size, off_t place)

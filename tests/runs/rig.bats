@@ -102,11 +102,7 @@ P
     options=(capture/rig --colour frames --method '{"window": 2, "overlap": 1, "reference-from": "all"}' "${small[@]}")
     "$NEUPIG" run "${options[@]}" -o whole
     rm -rf killed
-    "$NEUPIG" run "${options[@]}" -o killed &
-    pid=$!
-    while kill -0 $pid 2>/dev/null && [ "$(records killed)" -eq 0 ]; do sleep 0.02; done
-    kill -KILL $pid 2>/dev/null || true
-    wait $pid || true
+    killed_at state:0 "$NEUPIG" run "${options[@]}" -o killed
     "$NEUPIG" run "${options[@]}" -o killed
     cmp whole/reference.ply killed/reference.ply
     diff -r whole/meshes killed/meshes

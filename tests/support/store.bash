@@ -10,9 +10,18 @@ last_record() {
     grep -abo "NPGREC01$2" "$1" 2>/dev/null | tail -1 | cut -d: -f1
 }
 
-# The number of the newest state of the job in folder $1; nothing where there is none.
-newest_state() {
-    local store=$1/job/store.npg at
-    at=$(last_record "$store" state)
-    [ -z "$at" ] || od -An -td8 -j $((at + 16)) -N 8 "$store" | tr -d ' '
+# A command that gets signal $1 (KILL, TERM) behind record $2 that it writes (state:2, inside:-1), or a later one of that
+# kind; then the command.  killed_status: how it ended.
+signalled_at() {
+    local order
+    order=$(kill -l "$1"):$2
+    shift 2
+    killed_status=0
+    NPG_FAULT_SIGNAL=$order LD_PRELOAD=$(dirname "$NEUPIG")/fault_shim.so "$@" || killed_status=$?
+}
+
+# One that is killed there; fails where it ended before.
+killed_at() {
+    signalled_at KILL "$@"
+    [ "$killed_status" -eq 137 ]
 }
