@@ -170,6 +170,18 @@ void npg_kdtree_leave_out(npg_kdtree *tree, const uint8_t *keep)
         }
 }
 
+size_t npg_kdtree_groups(const npg_kdtree *tree, uint32_t *order, uint32_t *first)
+{
+    size_t groups = 0, count = 0;
+    for (size_t l = 0; l <= tree->inner; l++) {
+        if (l % (NPG_KDTREE_GROUP / LANES) == 0) first[groups++] = (uint32_t)count;
+        for (size_t k = 0; k < LANES; k++)
+            if (tree->leaves[l].index[k] < UINT32_MAX) order[count++] = tree->leaves[l].index[k];
+    }
+    first[groups] = (uint32_t)count;
+    return groups;
+}
+
 /* ---- searching ---- */
 
 #define INLINE static inline __attribute__((always_inline)) /* into every width of its caller */

@@ -1,12 +1,11 @@
 #include "outlier/winding_sums.h"
 
 #include <math.h>
-#include <stdlib.h>
 
+#include "geometry/geometry.h"
 #include "geometry/limits.h"
 #include "pipeline/parallel.h"
 
-#define GROUP_MAX    64 /* places of a group: about the root of their number, so that near and far cost alike */
 #define MOMENT_TERMS 9 /* of Q, 3 x 3 */
 
 /* Sources of a sum: points, or groups of them, whose moments are q[3 r + c] = sum m_r (p - middle)_c. */
@@ -144,49 +143,6 @@ static void set(const npg_vectors *to, size_t i, const npg_vectors *from, size_t
     to->z[i] = from->z[j];
 }
 
-typedef struct keyed {
-    float key;
-    uint32_t point;
-} keyed;
-
-static int by_key(const void *a, const void *b)
-{
-    const keyed *x = a, *y = b;
-    return x->key < y->key ? -1 : x->key > y->key ? 1 : x->point < y->point ? -1 : x->point > y->point;
-}
-
-static size_t longest_side(const npg_places *g, const float *points, uint32_t first, uint32_t end)
-{
-    float low[3] = {0}, high[3] = {0};
-    for (uint32_t i = first; i < end; i++)
-        for (size_t a = 0; a < 3; a++) {
-            float x = points[3 * (size_t)g->order[i] + a];
-            low[a] = i == first || x < low[a] ? x : low[a];
-            high[a] = i == first || x > high[a] ? x : high[a];
-        }
-    size_t axis = 0;
-    for (size_t a = 1; a < 3; a++)
-        if (high[a] - low[a] > high[axis] - low[axis]) axis = a;
-    return axis;
-}
-
-/* Places [first, end) halved across their longest side until GROUP_MAX are left. */
-static void divide(npg_places *g, keyed *scratch, const float *points, uint32_t first, uint32_t end)
-{
-    if (end - first <= GROUP_MAX) {
-        g->first[g->group_count++] = first;
-        return;
-    }
-    size_t axis = longest_side(g, points, first, end);
-    for (uint32_t i = first; i < end; i++)
-        scratch[i] = (keyed){points[3 * (size_t)g->order[i] + axis], g->order[i]};
-    qsort(scratch + first, end - first, sizeof *scratch, by_key);
-    for (uint32_t i = first; i < end; i++) g->order[i] = scratch[i].point;
-    uint32_t middle = first + (end - first) / 2;
-    divide(g, scratch, points, first, middle);
-    divide(g, scratch, points, middle, end);
-}
-
 static void measure(npg_places *g)
 {
     for (size_t k = 0; k < g->group_count; k++) {
@@ -211,8 +167,8 @@ static void measure(npg_places *g)
 npg_status npg_places_open(npg_places *g, npg_arena *arena, const float *points, size_t count,
                            const npg_winding_frame *frame)
 {
-    size_t most = 2 * count / GROUP_MAX + 1; /* a half has more than GROUP_MAX / 2 */
-    keyed *scratch = npg_arena_take(arena, count, sizeof *scratch);
+    size_t most = count / (NPG_KDTREE_GROUP / 2) + 1;
+    npg_kdtree *tree;
     *g = (npg_places){.count = count};
     npg_vectors_take(&g->at, arena, count);
     g->order = npg_arena_take(arena, count, sizeof *g->order);
@@ -220,9 +176,9 @@ npg_status npg_places_open(npg_places *g, npg_arena *arena, const float *points,
     npg_vectors_take(&g->middle, arena, most);
     g->radius = npg_arena_take(arena, most, sizeof *g->radius);
     NPG_TRY(npg_arena_status(arena));
-    for (size_t i = 0; i < count; i++) g->order[i] = (uint32_t)i;
-    divide(g, scratch, points, 0, (uint32_t)count);
-    g->first[g->group_count] = (uint32_t)count;
+    NPG_TRY(npg_kdtree_open(&tree, points, count));
+    g->group_count = npg_kdtree_groups(tree, g->order, g->first);
+    npg_kdtree_close(&tree);
     float *at[3] = {g->at.x, g->at.y, g->at.z};
     for (size_t i = 0; i < count; i++)
         for (size_t a = 0; a < 3; a++) {

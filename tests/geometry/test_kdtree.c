@@ -131,6 +131,39 @@ static void within_a_radius_is_what_looking_at_all_says(void **state)
     npg_kdtree_close(&tree);
 }
 
+/* All points once, and together: a group of 64 of N even ones on a square of side 1 is far smaller than that. */
+static void groups_lie_together(void **state)
+{
+    (void)state;
+    const size_t counts[] = {1, 16, 17, 63, 64, 65, 129, 1024, 1025, MOST};
+    static uint32_t order[MOST], first[2 * MOST / NPG_KDTREE_GROUP + 2];
+    for (size_t c = 0; c < sizeof counts / sizeof *counts; c++) {
+        size_t count = counts[c];
+        uint8_t is_listed[MOST] = {0};
+        npg_kdtree *tree;
+        for (size_t i = 0; i < count; i++) {
+            points[3 * i] = (float)(i * 7919 % count) / (float)count;
+            points[3 * i + 1] = (float)fmod(0.618034 * (double)(i * 7919 % count), 1);
+            points[3 * i + 2] = 0;
+        }
+        assert_int_equal(npg_kdtree_open(&tree, points, count), NPG_OK);
+        size_t groups = npg_kdtree_groups(tree, order, first);
+        assert_int_equal(first[0], 0);
+        assert_int_equal(first[groups], count);
+        for (size_t i = 0; i < count; i++) assert_false(is_listed[order[i]]++);
+        for (size_t g = 0; g < groups; g++) {
+            size_t of = first[g + 1] - first[g];
+            assert_true(of <= NPG_KDTREE_GROUP && (groups == 1 || of >= NPG_KDTREE_GROUP / 2));
+            float widest = 0;
+            for (size_t i = first[g]; i < first[g + 1]; i++)
+                widest = fmaxf(widest,
+                               dist(points + 3 * (size_t)order[first[g]], points + 3 * (size_t)order[i]));
+            assert_true(widest <= 10 * (float)NPG_KDTREE_GROUP / (float)count);
+        }
+        npg_kdtree_close(&tree);
+    }
+}
+
 static void memory_runs_out_without_harm(void **state)
 {
     (void)state;
@@ -152,6 +185,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(nearest_are_those_of_looking_at_all),
                                        cmocka_unit_test(what_is_left_out_is_not_found),
                                        cmocka_unit_test(within_a_radius_is_what_looking_at_all_says),
+                                       cmocka_unit_test(groups_lie_together),
                                        cmocka_unit_test(memory_runs_out_without_harm)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
