@@ -156,8 +156,8 @@ static void groups_lie_together(void **state)
             assert_true(of <= NPG_KDTREE_GROUP && (groups == 1 || of >= NPG_KDTREE_GROUP / 2));
             float widest = 0;
             for (size_t i = first[g]; i < first[g + 1]; i++)
-                widest = fmaxf(widest,
-                               dist(points + 3 * (size_t)order[first[g]], points + 3 * (size_t)order[i]));
+                widest =
+                    fmaxf(widest, dist(points + 3 * (size_t)order[first[g]], points + 3 * (size_t)order[i]));
             assert_true(widest <= 10 * (float)NPG_KDTREE_GROUP / (float)count);
         }
         npg_kdtree_close(&tree);
