@@ -308,12 +308,10 @@ static npg_status close_over(making *m)
 
 /* ---- keep it, or take it back ---- */
 
-typedef enum grade { NOT_WORSE, WORSE, CLEARLY_WORSE } grade;
-
 /* Judge the new reference and the one before it by what points of the sampled frames say.  Where that left nothing to
  * explain in any frame, points are where they belong, and the keyframe shows what was gathered of them.
- * *worse: the new one, by more than chance and by more than a tenth; it stays as it is where nothing can be said. */
-static npg_status compare(grade *worse, making *m, const npg_candidate_clouds *clouds, npg_mesh *before)
+ * *is_worse stays as it is where nothing can be said. */
+static npg_status compare(bool *is_worse, making *m, const npg_candidate_clouds *clouds, npg_mesh *before)
 {
     npg_judgement now, then;
     bool is_explained = npg_worker_facts(m->worker)->choice.is_tried;
@@ -326,8 +324,7 @@ static npg_status compare(grade *worse, making *m, const npg_candidate_clouds *c
     NPG_TRY(npg_judge(&now, clouds, at, m->mesh, &settings));
     npg_mesh_note(m->worker, "judged", now.mean);
     npg_mesh_note(m->worker, "judged_before", then.mean);
-    bool is_clear = is_explained ? npg_judged_clearly(&then, &now) : npg_judged_better(&then, &now);
-    *worse = is_clear ? CLEARLY_WORSE : npg_judged_worse(&now, &then) ? WORSE : NOT_WORSE;
+    *is_worse = is_explained ? npg_judged_clearly(&then, &now) : npg_judged_better(&then, &now);
     return NPG_OK;
 }
 
@@ -338,12 +335,12 @@ static npg_status take_back_if_worse(making *m)
     const npg_facts *facts = npg_worker_facts(m->worker);
     const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
     npg_mesh *before = facts->reference;
-    grade worse = NOT_WORSE;
+    bool is_worse = false;
     if (!m->fused || !before || !clouds || facts->brief.was_open || !facts->brief.takes_poses) return NPG_OK;
-    npg_status status = compare(&worse, m, clouds, before);
+    npg_status status = compare(&is_worse, m, clouds, before);
     if (status != NPG_DIVERGED) NPG_TRY(status);
-    json_object_set_new(npg_worker_report(m->worker), "taken_back", json_boolean(worse == CLEARLY_WORSE));
-    if (worse < CLEARLY_WORSE) return NPG_OK;
+    json_object_set_new(npg_worker_report(m->worker), "taken_back", json_boolean(is_worse));
+    if (!is_worse) return NPG_OK;
     npg_worker_log(m->worker, NPG_LOG_INFO, m->key->number,
                    "the surface of all frames' points does worse than the keyframe's own, which stays");
     npg_mesh_unref(&m->mesh);
@@ -352,13 +349,11 @@ static npg_status take_back_if_worse(making *m)
 }
 
 /* Layers of sensors that lie beside each other, and noise, make handles of small cells; those that larger cells
- * leave are the body's own, or of points that lie so.  Where they leave more than a few, the body has thin parts, which
- * larger cells lose: then they must not be worse at all. */
+ * leave are the body's own, or of points that lie so. */
 static npg_status try_larger_cells(making *m)
 {
     const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
-    bool stays_open = npg_worker_facts(m->worker)->brief.leaves_open;
-    grade worse = CLEARLY_WORSE;
+    bool stays_open = npg_worker_facts(m->worker)->brief.leaves_open, is_worse = true;
     making fine = *m;
     if (!m->fused || !clouds || !m->handles || m->state->depth || stays_open) return NPG_OK;
     json_t *report = npg_worker_report(m->worker), *of_fine = json_copy(report);
@@ -368,9 +363,7 @@ static npg_status try_larger_cells(making *m)
     m->state->is_larger_celled = false;
     if (!status) status = measure_reference(m);
     if (!status && (double)m->handles < NPG_MAJORITY * (double)fine.handles)
-        status = compare(&worse, m, clouds, fine.mesh);
-    bool are_few = (double)m->handles <= (1 - NPG_MOST) * (double)fine.handles;
-    bool is_worse = worse > (are_few ? WORSE : NOT_WORSE);
+        status = compare(&is_worse, m, clouds, fine.mesh);
     npg_worker_log(m->worker, NPG_LOG_INFO, m->key->number,
                    "of larger cells the surface has %lld handles, not %lld: %s", (long long)m->handles,
                    (long long)fine.handles, is_worse ? "it is not taken" : "it is taken");
