@@ -225,10 +225,9 @@ typedef void npg_kdtree_visit(void *user, uint32_t point, const uint32_t *index,
 npg_status npg_kdtree_each(const npg_kdtree *tree, size_t k, const uint8_t *only, npg_kdtree_visit *visit,
                            void *user, int threads);
 
-/* The tree's points in its order (N), in groups of at most NPG_KDTREE_GROUP that lie together and have half of that
- * at least where there are several: first (N / (NPG_KDTREE_GROUP / 2) + 2) has where each begins, and N.  Returns how many
- * there are. */
-#define NPG_KDTREE_GROUP 64
+/* The tree's points in its order (N), in groups of at most NPG_KDTREE_GROUP that lie together, half of that at least where
+ * there are several: first (N / (NPG_KDTREE_GROUP / 2) + 2) has where each begins, and N.  Returns how many there are. */
+#define NPG_KDTREE_GROUP 64 /* about the root of what winding sums go over: near and far cost alike */
 size_t npg_kdtree_groups(const npg_kdtree *tree, uint32_t *order, uint32_t *first);
 
 /* Leave out the points whose entry in keep (N) is 0: no later search finds them. */

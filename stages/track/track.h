@@ -192,7 +192,8 @@ void npg_prior_count(const npg_occlusion_prior *prior, float *since, const float
  * against that of the box of all frames.  One sensor leaves half of the body to the edges.  Samples without a
  * point within 3 w, or whose nearest is another part's, have no part; those where a sensor saw that nothing is
  * go the shortest way out of there (npg_free_space_leave()), where they are held until they have a point, and w is
- * at least as long as that is.  What a fit comes to is its Chamfer distance of what can be compared; before images
+ * at least as long as that is.  What a fit comes to is its Chamfer distance of what can be compared; before images,
+ * which tell what is lost,
  *
  *     cost = mean_p min(d_p^2, tau^2) / tau^2 + mean_s min(d_s^2, tau^2) / tau^2
  *

@@ -16,15 +16,15 @@
 /* Windows of 6 frames that go on by 4.  The least of some windows is compared with the least of as many later
  * ones; the last windows are left out, since by then the stages before hold no frames any more.  A leak of
  * one frame's arrays in each window would be 500 KiB.  How many chunks are on their way between stages is the
- * system's choice: a busy one had 45 KiB less in the early windows. */
-enum { FRAMES = 160, POINTS = 600, EARLY = 6, LATE = 29, AMONG = 6 };
+ * system's choice, hence the least of many windows. */
+enum { FRAMES = 160, POINTS = 600, EARLY = 6, LATE = 24, AMONG = 11 };
 /* The sanitizers' own books grow, and their heap can't be asked. */
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 enum { HEAP_GROWTH_KIB = 1 << 20, ANONYMOUS_GROWTH_KIB = 1 << 20 };
 #else
 enum { HEAP_GROWTH_KIB = 256, ANONYMOUS_GROWTH_KIB = 4096 };
 #endif
-enum { COUNTED_GROWTH_KIB = 256 };
+enum { COUNTED_GROWTH_KIB = 64 };
 
 /* ---- what the process holds ---- */
 
