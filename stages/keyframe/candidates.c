@@ -15,7 +15,28 @@
 
 /* ---- which frames ---- */
 
-void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, bool key_alone)
+/* The place in the choice of the frame in the fewest pieces, of those nearer to `at` than to what is tried beside it;
+ * of several the nearest. */
+static size_t least_cut(const npg_choice *choice, const uint8_t *pieces, size_t at)
+{
+    size_t best = at;
+    for (size_t away = 1; away <= choice->count / (2 * NPG_CHOICE_MAX); away++)
+        for (int side = 0; side < 2; side++) {
+            size_t i = side ? at + away : at - away; /* below 0 it wraps */
+            if (i < choice->count && pieces[choice->frames[i]] < pieces[choice->frames[best]]) best = i;
+        }
+    return best;
+}
+
+bool npg_candidates_is_whole(const npg_choice *choice, const uint8_t *pieces, int64_t index)
+{
+    bool is_whole = true;
+    for (size_t i = 0; i < choice->count; i++) is_whole &= pieces[choice->frames[i]] >= pieces[index];
+    return is_whole;
+}
+
+void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, const uint8_t *pieces,
+                         bool key_alone)
 {
     int64_t stride = (frame_count + SAMPLE_LEAST - 1) / SAMPLE_LEAST;
     if (stride > STRIDE_MOST) stride = STRIDE_MOST;
@@ -29,6 +50,7 @@ void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, b
     choice->candidate_count = 1;
     for (size_t i = 1; i < NPG_CHOICE_MAX && !key_alone; i++) {
         size_t at = (i * (choice->count - 1) + NPG_CHOICE_MAX / 2) / NPG_CHOICE_MAX;
+        at = least_cut(choice, pieces, at);
         choice->candidate_count += !choice->is_candidate[at];
         choice->is_candidate[at] = true;
     }
@@ -57,6 +79,7 @@ static npg_status try_one(const choosing *c, npg_candidate *one)
     NPG_TRY(npg_mesh_draft(&draft, cloud->fit, cloud->fit_normals, cloud->fit_count, c->judging.spacing_unit,
                            cloud->sensor_count > 0, c->settings));
     npg_status status = npg_mesh_handles(&one->handles, draft);
+    if (!status) status = npg_mesh_count_components(&one->pieces, draft);
     if (!status) status = npg_judge(&one->judgement, c->clouds, one->at, draft, &c->judging);
     one->is_followed = !status;
     npg_mesh_unref(&draft);
@@ -105,8 +128,14 @@ static size_t least_of(const npg_candidate *list, size_t count, size_t scored)
                : first;
 }
 
-/* Parts that touch in one frame are joined in its surface, which is a handle more; none is ever joined too
- * little.  So of those that points can't tell apart the one of fewest handles is taken. */
+/* Parts that touch in one frame are joined in its surface, which is a handle more, and what a hole cuts off is a piece
+ * more. */
+static int64_t flaws(const npg_candidate *one)
+{
+    return one->handles + (int64_t)one->pieces;
+}
+
+/* Of those that points can't tell apart the one of fewest flaws. */
 static size_t best_of(const npg_candidate *list, size_t count, size_t scored)
 {
     size_t least = least_of(list, count, scored), best = least;
@@ -114,8 +143,8 @@ static size_t best_of(const npg_candidate *list, size_t count, size_t scored)
         const npg_candidate *one = &list[i], *so_far = &list[best];
         bool is_as_good = one->is_followed && !npg_judged_worse(&one->judgement, &list[least].judgement);
         bool is_nearer =
-            best != least && one->handles == so_far->handles && one->judgement.mean < so_far->judgement.mean;
-        if (is_as_good && (one->handles < so_far->handles || is_nearer)) best = i;
+            best != least && flaws(one) == flaws(so_far) && one->judgement.mean < so_far->judgement.mean;
+        if (is_as_good && (flaws(one) < flaws(so_far) || is_nearer)) best = i;
     }
     return best;
 }
@@ -158,10 +187,11 @@ static void report_candidates(npg_worker *worker, const npg_candidate *list, siz
     json_t *of = json_array();
     for (size_t i = 0; i < count; i++)
         json_array_append_new(
-            of, json_pack("{sI sb so sI sI}", "number", (json_int_t)list[i].number, "followed",
+            of, json_pack("{sI sb so sI sI sI}", "number", (json_int_t)list[i].number, "followed",
                           list[i].is_followed, "judged",
                           npg_json_real(list[i].is_followed ? list[i].judgement.mean : (double)NAN), "frames",
-                          (json_int_t)list[i].judgement.count, "handles", (json_int_t)list[i].handles));
+                          (json_int_t)list[i].judgement.count, "handles", (json_int_t)list[i].handles,
+                          "pieces", (json_int_t)list[i].pieces));
     json_object_set_new(npg_worker_report(worker), "candidates", of);
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }

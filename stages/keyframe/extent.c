@@ -18,7 +18,9 @@
 struct npg_extent {
     npg_frame_box box;
     double area_cells_per_unit;
-    uint64_t *cells; /* GRID_WORDS, a bit per cell, all 0 between frames; owned */
+    uint64_t *cells; /* GRID_WORDS, a bit per cell, all 0 between frames; owned  */
+    size_t *found;   /* cells of a piece whose neighbours are to be asked for; owned */
+    size_t found_room;
 };
 
 /* ---- cells of the capture ---- */
@@ -65,6 +67,7 @@ void npg_extent_close(npg_extent **slot)
 {
     if (!*slot) return;
     npg_release(&(*slot)->cells);
+    npg_release(&(*slot)->found);
     npg_release(slot);
 }
 
@@ -78,6 +81,15 @@ static size_t cell_of(const float *unit, double cells_per_unit, double shift)
         cell = cell * GRID + (size_t)fmin(fmax(at, 0), GRID - 1);
     }
     return cell;
+}
+
+/* Whether the cell was set; it is not any more. */
+static bool take_cell(npg_extent *e, size_t cell)
+{
+    uint64_t bit = UINT64_C(1) << (cell % 64), *word = &e->cells[cell / 64];
+    bool was_set = *word & bit;
+    *word &= ~bit;
+    return was_set;
 }
 
 /* Set or clear the cells of all finite points; the result is the number of bits that changed. */
@@ -104,6 +116,39 @@ static size_t count_cells(npg_extent *e, const npg_frame *frame, double cells_pe
     size_t count = mark_cells(e, frame, cells_per_unit, shift, true);
     mark_cells(e, frame, cells_per_unit, shift, false);
     return count;
+}
+
+/* The cells that hang together with one that was taken, by faces, edges or corners; all of them are taken. */
+static npg_status take_piece(size_t *cell_count, npg_extent *e, size_t first)
+{
+    size_t waiting = 0, next = first;
+    for (*cell_count = 1;; ++*cell_count) {
+        size_t x = next / GRID / GRID, y = next / GRID % GRID, z = next % GRID;
+        NPG_TRY(npg_grow(&e->found, &e->found_room, waiting + 27, sizeof *e->found, NPG_FOR_RUN));
+        for (size_t k = 0; k < 27; k++) {
+            size_t at[3] = {x + k / 9 - 1, y + k / 3 % 3 - 1, z + k % 3 - 1}; /* below 0 it wraps */
+            if (at[0] >= GRID || at[1] >= GRID || at[2] >= GRID) continue;
+            next = (at[0] * GRID + at[1]) * GRID + at[2];
+            if (take_cell(e, next)) e->found[waiting++] = next;
+        }
+        if (!waiting) return NPG_OK;
+        next = e->found[--waiting];
+    }
+}
+
+npg_status npg_extent_pieces(size_t *count, npg_extent *e, const npg_frame *frame)
+{
+    size_t all = mark_cells(e, frame, e->area_cells_per_unit, 0, true), cell_count;
+    *count = 0;
+    for (size_t i = 0; i < frame->point_count; i++) {
+        float unit[3];
+        npg_box_local_to_unit(&e->box, unit, frame->pos_local + 3 * i, 1);
+        size_t cell = cell_of(unit, e->area_cells_per_unit, 0);
+        if (!npg_vec3_is_finitef(unit) || !take_cell(e, cell)) continue;
+        NPG_TRY(take_piece(&cell_count, e, cell));
+        *count += (double)cell_count >= NPG_PIECE_SHARE * (double)all;
+    }
+    return NPG_OK;
 }
 
 size_t npg_extent_papers(npg_extent *e, const npg_frame *frame)

@@ -231,6 +231,33 @@ static npg_status measure_extent(npg_worker *worker, candidate *scored, const np
     return NPG_OK;
 }
 
+static void free_pieces(void *kept)
+{
+    uint8_t *pieces = kept;
+    npg_release(&pieces);
+}
+
+/* What was skipped has none, and is as if it were in more than any other. */
+static npg_status open_pieces(npg_worker *worker)
+{
+    uint8_t *pieces;
+    size_t frame_count = (size_t)npg_worker_facts(worker)->planned_count;
+    NPG_TRY(npg_alloc_array(&pieces, NPG_FOR_RUN, frame_count, 1));
+    memset(pieces, UINT8_MAX, frame_count);
+    npg_worker_keep(worker, pieces, free_pieces);
+    return NPG_OK;
+}
+
+static npg_status note_pieces(npg_worker *worker, const npg_frame *frame)
+{
+    const keyframe_state *state = npg_worker_state(worker);
+    uint8_t *pieces = npg_worker_kept(worker);
+    size_t count;
+    NPG_TRY(npg_extent_pieces(&count, state->extent, frame));
+    pieces[frame->index] = (uint8_t)(count < UINT8_MAX ? count : UINT8_MAX);
+    return NPG_OK;
+}
+
 static npg_status score_frame(npg_worker *worker, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
@@ -239,6 +266,7 @@ static npg_status score_frame(npg_worker *worker, const npg_frame *frame)
     if (frame->is_skipped) return NPG_OK;
     candidate scored;
     NPG_TRY(measure_extent(worker, &scored, frame));
+    NPG_TRY(note_pieces(worker, frame));
     if (scored.cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &scored, frame));
     if (scored.cell_count) offer(state, scored);
     if (is_named && scored.cell_count && !state->is_chosen) {
@@ -295,13 +323,16 @@ static void set_choice(npg_worker *worker)
     const npg_facts *facts = npg_worker_facts(worker);
     bool chooses = has_candidates(worker) && !goes_by_area(worker);
     npg_choice *choice = npg_own(worker, choice);
+    const uint8_t *pieces = npg_worker_kept(worker);
     if (facts->planned_count < 2 || *own_mesh(worker) || state->choice == CHOICE_PAPER) return;
     choice->is_open = has_candidates(worker);
-    npg_candidates_list(choice, facts->plan.key, facts->planned_count, true);
+    npg_candidates_list(choice, facts->plan.key, facts->planned_count, pieces, true);
     /* A pass that follows one side of the body says little of what other frames see, and a sample little of all. */
-    bool is_tried = chooses && facts->brief.rounds_left && !facts->sensor_count_max &&
+    bool is_tried = chooses && npg_candidates_is_whole(choice, pieces, facts->plan.key) &&
+                    facts->brief.rounds_left && !facts->sensor_count_max &&
                     (int64_t)choice->count == facts->planned_count;
-    if (chooses && !is_tried) npg_candidates_list(choice, facts->plan.key, facts->planned_count, false);
+    if (chooses && !is_tried)
+        npg_candidates_list(choice, facts->plan.key, facts->planned_count, pieces, false);
     choice->is_tried = is_tried;
 }
 
@@ -368,7 +399,8 @@ static npg_status settle(npg_worker *worker)
     const npg_candidate_clouds *clouds = npg_worker_fact(worker, &npg_fact_candidate_clouds);
     int64_t key = facts->brief.key;
     if (facts->brief.compares)
-        npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count, false);
+        npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count,
+                            npg_worker_kept(worker), false);
     if (npg_worker_pass(worker) != NPG_PASS_FUSE || key < 0 || key == facts->plan.key) return NPG_OK;
     int64_t number = clouds->list[npg_candidate_clouds_find(clouds, key)].number;
     npg_own(worker, plan)->key = key;
@@ -431,6 +463,7 @@ static npg_status init(npg_worker *worker)
                          (long long)state->overlap, (long long)window);
     if (pass == NPG_PASS_SOLVE && facts->is_live && facts->is_resumed)
         return npg_outside_restore(&state->outside, npg_job_state(npg_job_of(worker)), facts);
+    if (pass == NPG_PASS_SCORE) NPG_TRY(open_pieces(worker));
     if (pass == NPG_PASS_MEASURE) {
         *npg_own(worker, bounds_local) = npg_bounds_empty();
         *npg_own(worker, point_count_max) = 0;

@@ -51,6 +51,10 @@ void npg_extent_close(npg_extent **extent);
 size_t npg_extent_papers(npg_extent *extent, const npg_frame *frame);
 size_t npg_extent_area(npg_extent *extent, const npg_frame *frame);
 
+/* Pieces of NPG_PIECE_SHARE of the frame's area at least, of cells of the second kind that touch: what a hole cuts off
+ * is one more.  NPG_MEMORY. */
+npg_status npg_extent_pieces(size_t *count, npg_extent *extent, const npg_frame *frame);
+
 /* Outside: a watch on the frames of a live source that leave the box of the look-ahead. */
 
 /* A frame that lies outside the box. */
@@ -83,19 +87,25 @@ npg_status npg_outside_restore(npg_outside *outside, const npg_record *in, const
  * nothing of limbs that touch, of what a sensor did not see, or of a pose that is hard to follow from.  So
  * frames spread over the sample are tried, too: each one's points are made a draft surface, and the judge
  * (reference/reference.h) says how it fares.  The frame by score stays unless another is clearly
- * better, or not worse beyond chance with fewer handles. */
+ * better, or not worse beyond chance with fewer handles and pieces. */
 
 typedef struct npg_candidate {
     size_t at; /* place in the clouds */
     int64_t index, number;
     bool is_followed; /* false: no surface could be made, or it was lost */
-    int64_t handles;  /* of the draft                                    */
+    int64_t handles;  /* of the draft */
+    size_t pieces;    /* of the draft */
     npg_judgement judgement;
 } npg_candidate;
 
 /* Fill choice with the frames to read: all of a short capture, every second or third one of a longer one,
- * around the key.  Candidates are the key alone, or frames spread over these as well. */
-void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, bool key_alone);
+ * around the key.  Candidates are the key alone, or frames spread over these as well, those in the fewest pieces
+ * around each place.  pieces: npg_extent_pieces() of each frame. */
+void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, const uint8_t *pieces,
+                         bool key_alone);
+
+/* Whether no frame of the choice is in fewer pieces than this one. */
+bool npg_candidates_is_whole(const npg_choice *choice, const uint8_t *pieces, int64_t index);
 
 /* Try the candidates among the clouds.  *count: how many; *best: place in the list of the one to take;
  * scored: index of the frame by score.  NPG_MEMORY, NPG_STOPPED. */

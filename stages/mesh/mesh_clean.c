@@ -9,8 +9,6 @@
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
 
-#define PIECE_SHARE 0.01 /* of the area: a piece that may belong to the body ... */
-
 npg_status npg_points_dist(float *dist, const float *queries, size_t query_count, const float *points,
                            size_t point_count)
 {
@@ -107,7 +105,7 @@ static npg_status choose_pieces(uint8_t *is_kept, double *area, const npg_mesh *
         if (area[i] > area[largest]) largest = i;
     }
     if (size > 0 && count > 1)
-        NPG_TRY(find_near(is_kept, mesh, component_of, area, largest, PIECE_SHARE * total,
+        NPG_TRY(find_near(is_kept, mesh, component_of, area, largest, NPG_PIECE_SHARE * total,
                           NPG_NEARBY_SHARE * size));
     is_kept[largest] = 1;
     return NPG_OK;

@@ -111,12 +111,15 @@ npg_status npg_mesh_trim_shreds(npg_mesh **mesh, double *share, double width);
 npg_status npg_mesh_unseen(double *share, const npg_mesh *mesh, const float *points, size_t point_count,
                            double dist_max);
 
+/* Of all area: what is smaller is a shred, and no piece. */
+#define NPG_PIECE_SHARE 0.01
+
 typedef struct npg_pieces {
     size_t found, kept; /* components */
     double lost_share;  /* share of the area that went */
 } npg_pieces;
 
-/* Keep the component of the largest area, and those with a hundredth of all area that come within a tenth of
+/* Keep the component of the largest area, and those with NPG_PIECE_SHARE of all area that come within a tenth of
  * `size` of it (a hand that a hole in the points cuts off belongs to the body; a ball beside it does not).
  * size 0: the largest alone; HUGE_VAL: wherever they are.  A mesh without faces stays as it is. */
 npg_status npg_mesh_keep_main(npg_mesh **mesh, npg_pieces *pieces, double size);

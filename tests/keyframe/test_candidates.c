@@ -14,6 +14,7 @@ static const npg_stage *const chain[] = {&test_source,    &npg_stage_outlier, &n
                                          &npg_stage_mesh, &test_sink,         NULL};
 
 typedef struct seen {
+    bool has_holes; /* told */
     int64_t key, reported_key;
     int64_t euler;
     npg_manifold manifold;
@@ -44,16 +45,39 @@ static double feet_at(int64_t index)
                                     : 0.1 + 0.13 * (double)(index - 6);
 }
 
-static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *user)
+static void keep_point(npg_frame *frame, size_t to, size_t from)
 {
-    (void)user;
-    facts->origin.known = true;
-    return legs_frame(frame, feet_at(index), 77 + (uint64_t)index);
+    memmove(frame->pos_local + 3 * to, frame->pos_local + 3 * from, 3 * sizeof(float));
+    memmove(frame->normals + 3 * to, frame->normals + 3 * from, 3 * sizeof(float));
 }
 
-static seen run(const char *choice)
+/* A hole through the right shin. */
+static void cut_leg(npg_frame *frame)
 {
-    seen s = {0};
+    size_t kept = 0;
+    for (size_t i = 0; i < frame->point_count; i++) {
+        const float *p = frame->pos_local + 3 * i;
+        if (p[0] < 0 || p[1] < -0.4F || p[1] > 0) keep_point(frame, kept++, i);
+    }
+    frame->point_count = kept;
+}
+
+enum { WHOLE = 8 }; /* the only frame without a hole, where there are some */
+
+static npg_status make(npg_frame *frame, npg_facts *facts, int64_t index, void *user)
+{
+    const seen *s = user;
+    facts->origin.known = true;
+    NPG_TRY(
+        legs_frame(frame, s->has_holes ? 0.3 + 0.01 * (double)index : feet_at(index), 77 + (uint64_t)index));
+    if (s->has_holes && index != WHOLE) cut_leg(frame);
+    if (s->has_holes && index == WHOLE) frame->point_count /= 2; /* so that its score is the least */
+    return NPG_OK;
+}
+
+static seen run(const char *choice, bool has_holes)
+{
+    seen s = {.has_holes = has_holes};
     char text[1024];
     const char *settings[][2] = {{"keyframe-choice", choice}, {"pull", "no"},    {"output", "unused"},
                                  {"input", "unused"},         {"faces", "6000"}, {NULL, NULL}};
@@ -69,7 +93,7 @@ static seen run(const char *choice)
 static void the_score_alone_takes_touching_feet(void **state)
 {
     (void)state;
-    seen s = run("paper");
+    seen s = run("paper", false);
     assert_in_range(s.key, 3, 6);
     assert_true(s.euler < 2);
 }
@@ -77,10 +101,19 @@ static void the_score_alone_takes_touching_feet(void **state)
 static void a_frame_with_feet_apart_is_chosen(void **state)
 {
     (void)state;
-    seen s = run("judged");
+    seen s = run("judged", false);
     assert_true(s.key < 3 || s.key > 6);
     assert_int_equal(s.euler, 2);
     assert_int_equal(s.manifold.border_edges, 0);
+}
+
+static void a_frame_whose_leg_is_cut_off_is_not_chosen(void **state)
+{
+    (void)state;
+    assert_int_not_equal(run("paper", true).key, WHOLE);
+    seen s = run("judged", true);
+    assert_int_equal(s.key, WHOLE);
+    assert_int_equal(s.euler, 2); /* of one piece */
 }
 
 int main(void)
@@ -88,6 +121,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_score_alone_takes_touching_feet),
         cmocka_unit_test(a_frame_with_feet_apart_is_chosen),
+        cmocka_unit_test(a_frame_whose_leg_is_cut_off_is_not_chosen),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

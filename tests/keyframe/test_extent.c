@@ -77,9 +77,37 @@ static void what_is_no_surface_does_not_count(void **state)
     npg_extent_close(&extent);
 }
 
+static void what_is_cut_off_is_a_piece_more(void **state)
+{
+    static float points[3 * POINTS];
+    npg_frame frame;
+    npg_frame_box box = box_of();
+    npg_extent *extent;
+    size_t whole, cut, shred;
+    (void)state;
+    fill_sheet(&frame, points, POINTS, 1.6);
+    assert_int_equal(npg_extent_open(&extent, &box, &frame), NPG_OK);
+    assert_int_equal(npg_extent_pieces(&whole, extent, &frame), NPG_OK);
+    for (size_t i = 0; i < 3 * POINTS; i += 3) /* a strip without points through the middle */
+        if (points[i] > -0.3F && points[i] < 0.1F) points[i] = NAN;
+    assert_int_equal(npg_extent_pieces(&cut, extent, &frame), NPG_OK);
+    bool is_first = true; /* of what is behind it a point stays */
+    for (size_t i = 0; i < 3 * POINTS; i += 3) {
+        if (!(points[i] > 0.1F)) continue;
+        if (!is_first) points[i] = NAN;
+        is_first = false;
+    }
+    assert_int_equal(npg_extent_pieces(&shred, extent, &frame), NPG_OK);
+    assert_int_equal(whole, 1);
+    assert_int_equal(cut, 2);
+    assert_int_equal(shred, 1);
+    npg_extent_close(&extent);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(cells_go_with_the_area),
-                                       cmocka_unit_test(what_is_no_surface_does_not_count)};
+                                       cmocka_unit_test(what_is_no_surface_does_not_count),
+                                       cmocka_unit_test(what_is_cut_off_is_a_piece_more)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
