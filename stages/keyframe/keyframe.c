@@ -131,6 +131,23 @@ static npg_status refuse_one_window(const npg_facts *facts)
                      (long long)facts->planned_count);
 }
 
+static void free_pieces(void *kept)
+{
+    uint8_t *pieces = kept;
+    npg_release(&pieces);
+}
+
+/* What was skipped or has no finite point is as if it were in more than any other. */
+static npg_status open_pieces(npg_worker *worker)
+{
+    uint8_t *pieces;
+    size_t frame_count = (size_t)npg_worker_facts(worker)->planned_count;
+    NPG_TRY(npg_alloc_array(&pieces, NPG_FOR_RUN, frame_count, 1));
+    memset(pieces, UINT8_MAX, frame_count);
+    npg_worker_keep(worker, pieces, free_pieces);
+    return NPG_OK;
+}
+
 static npg_status close_measuring(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
@@ -142,7 +159,7 @@ static npg_status close_measuring(npg_worker *worker)
     NPG_TRY(npg_frame_box_set(npg_own(worker, box), &facts->origin, &facts->bounds_local));
     set_diagonal(state, npg_own(worker, box));
     report_box(npg_worker_report(worker), facts);
-    return NPG_OK;
+    return open_pieces(worker);
 }
 
 /* ---- scoring ---- */
@@ -231,30 +248,13 @@ static npg_status measure_extent(npg_worker *worker, candidate *scored, const np
     return NPG_OK;
 }
 
-static void free_pieces(void *kept)
-{
-    uint8_t *pieces = kept;
-    npg_release(&pieces);
-}
-
-/* What was skipped has none, and is as if it were in more than any other. */
-static npg_status open_pieces(npg_worker *worker)
-{
-    uint8_t *pieces;
-    size_t frame_count = (size_t)npg_worker_facts(worker)->planned_count;
-    NPG_TRY(npg_alloc_array(&pieces, NPG_FOR_RUN, frame_count, 1));
-    memset(pieces, UINT8_MAX, frame_count);
-    npg_worker_keep(worker, pieces, free_pieces);
-    return NPG_OK;
-}
-
 static npg_status note_pieces(npg_worker *worker, const npg_frame *frame)
 {
     const keyframe_state *state = npg_worker_state(worker);
     uint8_t *pieces = npg_worker_kept(worker);
     size_t count;
     NPG_TRY(npg_extent_pieces(&count, state->extent, frame));
-    pieces[frame->index] = (uint8_t)(count < UINT8_MAX ? count : UINT8_MAX);
+    pieces[frame->index] = (uint8_t)(count && count < UINT8_MAX ? count : UINT8_MAX);
     return NPG_OK;
 }
 
@@ -463,7 +463,6 @@ static npg_status init(npg_worker *worker)
                          (long long)state->overlap, (long long)window);
     if (pass == NPG_PASS_SOLVE && facts->is_live && facts->is_resumed)
         return npg_outside_restore(&state->outside, npg_job_state(npg_job_of(worker)), facts);
-    if (pass == NPG_PASS_SCORE) NPG_TRY(open_pieces(worker));
     if (pass == NPG_PASS_MEASURE) {
         *npg_own(worker, bounds_local) = npg_bounds_empty();
         *npg_own(worker, point_count_max) = 0;

@@ -36,17 +36,18 @@ SENSORS = {
     "cam3": ["--cameras", "3", "--no-normals"],
     "cam4n": ["--cameras", "4", "--noise", "0.1", "--no-normals"],
     "cam1": ["--cameras", "1", "--no-normals"],
+    "holes": ["--noise", "0.1", "--holes", "5"],
 }
 # A body of neupig-bodies (tests/README.md) with its options, or one of --data with its frames; and what sees it.
 BODIES = {
-    "walker": (["--body", "walker", "--cycles", "0.5"], "clean noise cam3 cam4n cam1"),
+    "walker": (["--body", "walker", "--cycles", "0.5"], "clean noise cam3 cam4n cam1 holes"),
     "runner": (["--body", "walker", "--cycles", "1.5", "--travel", "0.5"], "clean noise cam3"),
     "bar": (["--body", "bar", "--cycles", "0.4"], "clean noise"),
     "hands": (["--body", "hands"], "clean noise"),
     "samba0": (("samba", 0, 2), "clean noise cam3 cam4n cam1"),
-    "samba60": (("samba", 60, 2), "clean noise cam3 cam4n"),
+    "samba60": (("samba", 60, 2), "clean noise cam3 cam4n holes"),
     "samba140": (("samba", 140, 2), "clean noise cam4n"),
-    "horse": (("horse-gallop", 0, 1), "clean noise cam3 cam4n"),
+    "horse": (("horse-gallop", 0, 1), "clean noise cam3 cam4n holes"),
     "chicken": (("chicken", 150, 2), "clean noise"),
 }
 CAPTURES = [f"{body}.{sensor}" for body, (_, sensors) in BODIES.items() for sensor in sensors.split()]

@@ -2,7 +2,7 @@
 """A capture for the bed from meshes that move: BODY.npz (verts T x V x 3, faces F x 3) to OUT/points and OUT/truth.
 
     sampled.py BODY.npz OUT [--start N] [--step N] [--frames N] [--points N] [--seed N] [--noise PERCENT] [--outliers PERCENT]
-               [--cameras N] [--no-normals]
+               [--cameras N] [--holes N] [--no-normals]
 
 Options have the names and meanings of `neupig synth`.  Takes numpy.
 """
@@ -12,6 +12,7 @@ import pathlib
 
 import numpy as np
 
+HOLE = 0.06  # of the diagonal: radius
 PIXELS = 160  # across a camera's picture: some 20 dense samples fall into one
 
 
@@ -72,6 +73,9 @@ def make_frame(options, verts, faces, size, random):
             seen |= is_seen(dense, dense_normals, eye, middle, size)
         chosen = random.permutation(np.flatnonzero(seen))[:count]
         points, normals = dense[chosen], dense_normals[chosen]
+    for _ in range(options.holes):
+        is_left = np.linalg.norm(points - points[random.integers(len(points))], axis=1) > HOLE * size
+        points, normals = points[is_left], normals[is_left]
     points = points + random.normal(0, options.noise / 100 * size, points.shape) if options.noise else points
     is_out = random.random(len(points)) < options.outliers / 100
     low, high = points.min(0), points.max(0)
@@ -83,7 +87,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("body", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
-    for name, value in (("start", 0), ("step", 1), ("frames", 12), ("points", 2000), ("seed", 0), ("cameras", 0)):
+    for name, value in (("start", 0), ("step", 1), ("frames", 12), ("points", 2000), ("seed", 0), ("cameras", 0), ("holes", 0)):
         parser.add_argument(f"--{name}", type=int, default=value)
     for name in ("noise", "outliers"):
         parser.add_argument(f"--{name}", type=float, default=0)
