@@ -551,6 +551,14 @@ static void release_facts(npg_run *run)
     }
 }
 
+static void release_kept(npg_worker *worker)
+{
+    if (!worker->release_kept)
+        npg_release(&worker->kept);
+    else if (worker->kept)
+        worker->release_kept(worker->kept);
+}
+
 void npg_run_close(npg_run **slot)
 {
     if (!slot || !*slot) return;
@@ -559,8 +567,7 @@ void npg_run_close(npg_run **slot)
     close_ends(run);
     join_conductor(run);
     release_facts(run);
-    for (size_t i = 0; i < run->worker_count; i++)
-        if (run->workers[i].kept) run->workers[i].release_kept(run->workers[i].kept);
+    for (size_t i = 0; i < run->worker_count; i++) release_kept(&run->workers[i]);
     for (size_t i = 0; i < run->latch_count; i++) npg_latch_close(&run->latches[i]);
     npg_chunk_close(&run->pulled);
     npg_ring_close(&run->feed);

@@ -230,7 +230,7 @@ void *npg_worker_take_fact(npg_worker *worker, const npg_fact_kind *kind);
 npg_status npg_worker_open_latch(npg_worker *worker, npg_latch **latch, int64_t count);
 
 /* What a stage keeps from pass to pass (its state is new in each): NULL until it says so.  release is called
- * on the thing when the run closes. */
+ * on the thing when the run closes; NULL: it is one piece of memory, and npg_release()d. */
 void npg_worker_keep(npg_worker *worker, void *thing, void (*release)(void *thing));
 void *npg_worker_kept(const npg_worker *worker);
 

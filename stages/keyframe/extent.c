@@ -83,13 +83,13 @@ static size_t cell_of(const float *unit, double cells_per_unit, double shift)
     return cell;
 }
 
-/* Whether the cell was set; it is not any more. */
-static bool take_cell(npg_extent *e, size_t cell)
+/* Set or clear a cell; whether that changed it. */
+static bool turn_cell(npg_extent *e, size_t cell, bool on)
 {
     uint64_t bit = UINT64_C(1) << (cell % 64), *word = &e->cells[cell / 64];
-    bool was_set = *word & bit;
-    *word &= ~bit;
-    return was_set;
+    bool was_on = *word & bit;
+    *word = on ? *word | bit : *word & ~bit;
+    return was_on != on;
 }
 
 /* Set or clear the cells of all finite points; the result is the number of bits that changed. */
@@ -102,10 +102,7 @@ static size_t mark_cells(npg_extent *e, const npg_frame *frame, double cells_per
         npg_box_local_to_unit(&e->box, unit, frame->pos_local + 3 * first, count);
         for (size_t i = 0; i < count; i++) {
             if (!npg_vec3_is_finitef(unit + 3 * i)) continue;
-            size_t cell = cell_of(unit + 3 * i, cells_per_unit, shift);
-            uint64_t bit = UINT64_C(1) << (cell % 64), *word = &e->cells[cell / 64];
-            changed += on ? !(*word & bit) : (*word & bit) != 0;
-            *word = on ? *word | bit : *word & ~bit;
+            changed += turn_cell(e, cell_of(unit + 3 * i, cells_per_unit, shift), on);
         }
     }
     return changed;
@@ -118,8 +115,8 @@ static size_t count_cells(npg_extent *e, const npg_frame *frame, double cells_pe
     return count;
 }
 
-/* The cells that hang together with one that was taken, by faces, edges or corners; all of them are taken. */
-static npg_status take_piece(size_t *cell_count, npg_extent *e, size_t first)
+/* Clear the cells that hang together with one that was cleared, by faces, edges or corners, and count all of them. */
+static npg_status clear_piece(size_t *cell_count, npg_extent *e, size_t first)
 {
     size_t waiting = 0, next = first;
     for (*cell_count = 1;; ++*cell_count) {
@@ -129,7 +126,7 @@ static npg_status take_piece(size_t *cell_count, npg_extent *e, size_t first)
             size_t at[3] = {x + k / 9 - 1, y + k / 3 % 3 - 1, z + k % 3 - 1}; /* below 0 it wraps */
             if (at[0] >= GRID || at[1] >= GRID || at[2] >= GRID) continue;
             next = (at[0] * GRID + at[1]) * GRID + at[2];
-            if (take_cell(e, next)) e->found[waiting++] = next;
+            if (turn_cell(e, next, false)) e->found[waiting++] = next;
         }
         if (!waiting) return NPG_OK;
         next = e->found[--waiting];
@@ -144,8 +141,8 @@ npg_status npg_extent_pieces(size_t *count, npg_extent *e, const npg_frame *fram
         float unit[3];
         npg_box_local_to_unit(&e->box, unit, frame->pos_local + 3 * i, 1);
         size_t cell = cell_of(unit, e->area_cells_per_unit, 0);
-        if (!npg_vec3_is_finitef(unit) || !take_cell(e, cell)) continue;
-        NPG_TRY(take_piece(&cell_count, e, cell));
+        if (!npg_vec3_is_finitef(unit) || !turn_cell(e, cell, false)) continue;
+        NPG_TRY(clear_piece(&cell_count, e, cell));
         *count += (double)cell_count >= NPG_PIECE_SHARE * (double)all;
     }
     return NPG_OK;

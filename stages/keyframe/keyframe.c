@@ -131,20 +131,14 @@ static npg_status refuse_one_window(const npg_facts *facts)
                      (long long)facts->planned_count);
 }
 
-static void free_pieces(void *kept)
-{
-    uint8_t *pieces = kept;
-    npg_release(&pieces);
-}
-
-/* What was skipped or has no finite point is as if it were in more than any other. */
+/* What was skipped, has no finite point or was not asked for is as if it were in more than any other. */
 static npg_status open_pieces(npg_worker *worker)
 {
     uint8_t *pieces;
     size_t frame_count = (size_t)npg_worker_facts(worker)->planned_count;
     NPG_TRY(npg_alloc_array(&pieces, NPG_FOR_RUN, frame_count, 1));
     memset(pieces, UINT8_MAX, frame_count);
-    npg_worker_keep(worker, pieces, free_pieces);
+    npg_worker_keep(worker, pieces, NULL);
     return NPG_OK;
 }
 
@@ -223,6 +217,12 @@ static bool goes_by_area(const npg_worker *worker)
     return has_candidates(worker) && npg_worker_facts(worker)->sensor_count_max > 1;
 }
 
+/* Whether surfaces of several frames may be compared for the keyframe. */
+static bool compares(const npg_worker *worker)
+{
+    return has_candidates(worker) && !goes_by_area(worker);
+}
+
 /* Areas differ by a few per cent only, so the middle weighs less. */
 static double area_score_of(size_t cell_count, double from_middle, int64_t frame_count)
 {
@@ -266,7 +266,7 @@ static npg_status score_frame(npg_worker *worker, const npg_frame *frame)
     if (frame->is_skipped) return NPG_OK;
     candidate scored;
     NPG_TRY(measure_extent(worker, &scored, frame));
-    NPG_TRY(note_pieces(worker, frame));
+    if (compares(worker)) NPG_TRY(note_pieces(worker, frame));
     if (scored.cell_count && *own_mesh(worker)) NPG_TRY(score_by_mesh(worker, &scored, frame));
     if (scored.cell_count) offer(state, scored);
     if (is_named && scored.cell_count && !state->is_chosen) {
@@ -321,13 +321,14 @@ static void set_choice(npg_worker *worker)
 {
     const keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    bool chooses = has_candidates(worker) && !goes_by_area(worker);
+    bool chooses = compares(worker);
     npg_choice *choice = npg_own(worker, choice);
     const uint8_t *pieces = npg_worker_kept(worker);
     if (facts->planned_count < 2 || *own_mesh(worker) || state->choice == CHOICE_PAPER) return;
     choice->is_open = has_candidates(worker);
     npg_candidates_list(choice, facts->plan.key, facts->planned_count, pieces, true);
-    /* A pass that follows one side of the body says little of what other frames see, and a sample little of all. */
+    /* A pass that follows one side of the body says little of what other frames see, a sample little of all, and a key
+     * in more pieces than others explains what it lacks by stretching. */
     bool is_tried = chooses && npg_candidates_is_whole(choice, pieces, facts->plan.key) &&
                     facts->brief.rounds_left && !facts->sensor_count_max &&
                     (int64_t)choice->count == facts->planned_count;

@@ -176,18 +176,12 @@ static void tell(npg_worker *worker, const npg_reference_loop *loop, const npg_p
 
 /* ---- decisions ---- */
 
-static void release_loop(void *thing)
-{
-    npg_reference_loop *loop = thing;
-    npg_release(&loop);
-}
-
 static npg_status begin(npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
     npg_reference_loop *loop;
     NPG_TRY(npg_alloc(&loop, NPG_FOR_MESH, sizeof *loop));
-    npg_worker_keep(worker, loop, release_loop);
+    npg_worker_keep(worker, loop, NULL);
     *npg_own(worker, brief) = npg_reference_begin(loop, s->usable > 1 ? s->rounds : 0, (size_t)s->attempts);
     *npg_own(worker, sensor_count_max) = s->sensors;
     *npg_own(worker, view_count_max) = s->views;
