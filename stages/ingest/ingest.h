@@ -145,8 +145,8 @@ bool npg_rig_is(const char *path);
 npg_status npg_rig_open(npg_rig **rig, const char *path, const npg_rig_settings *settings);
 void npg_rig_close(npg_rig **rig);
 
-/* Which way its sensors have up, on average, as the nearest of y, z, -y and -z: that of the images, as cameras
- * are seldom put up lying. */
+/* Which way its sensors have up, on average, as the nearest of y, z, -y and -z: that of the images; of cameras that
+ * are put up lying, whose images have it near x, that across them, y or z. */
 npg_up npg_rig_up(const npg_rig *rig);
 
 /* Place of a frame number; SIZE_MAX for one that is not there. */

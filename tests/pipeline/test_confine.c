@@ -32,27 +32,45 @@ static void *add_one(void *number)
     return NULL;
 }
 
-enum { NO_SECCOMP = 77 };
+/* A step that does not end has a code, too: 100 more than if it fails. */
+enum { NO_SECCOMP = 77, STUCK = 100, STUCK_S = 120 };
+static volatile sig_atomic_t at_step;
+
+static void end_stuck(int signal)
+{
+    (void)signal;
+    _exit(STUCK + at_step);
+}
+
+#define STEP(number, fails)                                                                                  \
+    do {                                                                                                     \
+        at_step = (number);                                                                                  \
+        if (fails) return at_step;                                                                           \
+    } while (0)
 
 static int try_all(void)
 {
     pthread_t thread;
     int number = 1, out = dup(1);
     char *const arguments[] = {(char *)(uintptr_t) "true", NULL};
+    signal(SIGALRM, end_stuck);
+    alarm(STUCK_S);
     if (!npg_confine_calls()) return NO_SECCOMP;
-    if (open("/etc/passwd", O_RDONLY) >= 0 || errno != EPERM) return 1;
-    if (fopen("/tmp/npg-confine", "w") || errno != EPERM) return 2;
-    if (socket(AF_INET, SOCK_STREAM, 0) >= 0 || errno != EPERM) return 3;
-    if (execv("/bin/true", arguments) != -1 || errno != EPERM) return 4;
-    if (kill(getppid(), 0) != -1 || errno != EPERM) return 5;
-    if (unlink("/tmp/npg-confine") != -1 || errno != EPERM) return 6;
+    STEP(1, open("/etc/passwd", O_RDONLY) >= 0 || errno != EPERM);
+    STEP(2, fopen("/tmp/npg-confine", "w") || errno != EPERM);
+    STEP(3, socket(AF_INET, SOCK_STREAM, 0) >= 0 || errno != EPERM);
+    STEP(4, execv("/bin/true", arguments) != -1 || errno != EPERM);
+    STEP(5, kill(getppid(), 0) != -1 || errno != EPERM);
+    STEP(6, unlink("/tmp/npg-confine") != -1 || errno != EPERM);
     /* what a computation needs */
-    if (pthread_create(&thread, NULL, add_one, &number) || pthread_join(thread, NULL) || number != 2)
-        return 7;
+    STEP(7, pthread_create(&thread, NULL, add_one, &number));
+    STEP(8, pthread_join(thread, NULL) || number != 2);
+    at_step = 9;
     void *block = malloc((size_t)64 << 20);
-    if (!block) return 8;
+    if (!block) return 9;
     free(block);
-    return write(out, "", 0) == 0 ? 0 : 9;
+    STEP(10, write(out, "", 0) != 0);
+    return 0;
 }
 
 static void test_calls(void **state)

@@ -54,7 +54,9 @@ size_of() { od -An -tu1 -j16 -N8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $
 import json, sys
 rig = json.load(open(sys.argv[1]))
 for sensor in rig["sensors"]: del sensor["pose"]
-json.dump(rig, open(sys.argv[2], "w"))' r/rig/rig.json r/rig/own.json
+json.dump(rig, open(sys.argv[2], "w"))
+for sensor in rig["sensors"]: sensor["pose"] = [0, -1, 0, 0, -1, 0, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1]
+json.dump(rig, open(sys.argv[3], "w"))' r/rig/rig.json r/rig/own.json r/rig/lying.json
     "$NEUPIG" render r/rig/own.json -o auto.png --height 50
     "$NEUPIG" render r/rig/own.json -o down.png --height 50 --up -y
     cmp auto.png down.png
@@ -63,6 +65,8 @@ json.dump(rig, open(sys.argv[2], "w"))' r/rig/rig.json r/rig/own.json
     [ "$status" -eq 1 ]
     "$NEUPIG" probe r/rig/own.json | grep '^up  *-y, as the sensors stand; run --axes x-y-z'
     "$NEUPIG" probe r/rig/rig.json | grep '^up  *y, as the sensors stand$'
+    # a camera that lies says no more than that up is across its images
+    "$NEUPIG" probe r/rig/lying.json | grep '^up  *y, as the sensors stand$'
 }
 
 @test "colours in the file are shown" {

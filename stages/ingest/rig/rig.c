@@ -176,12 +176,17 @@ void npg_rig_pose(const npg_rig *rig, double out[12], size_t s, const npg_rig_sh
 
 npg_up npg_rig_up(const npg_rig *rig)
 {
-    double y = 0, z = 0, pose[12];
+    double x = 0, y = 0, z = 0, across_y = 0, across_z = 0, pose[12];
     for (size_t s = 0; s < rig->sensor_count; s++) {
         npg_rig_pose(rig, pose, s, rig->sensors[s].shots);
-        y -= pose[5]; /* images have y down */
+        x -= pose[1]; /* images have y down */
+        y -= pose[5];
         z -= pose[9];
+        across_y += pose[4];
+        across_z += pose[8];
     }
+    /* They lie: across their images is up, or down, which they can't say. */
+    if (fabs(x) > fmax(fabs(y), fabs(z))) return fabs(across_y) >= fabs(across_z) ? NPG_UP_Y : NPG_UP_Z;
     if (fabs(y) >= fabs(z)) return y < 0 ? NPG_UP_MINUS_Y : NPG_UP_Y;
     return z < 0 ? NPG_UP_MINUS_Z : NPG_UP_Z;
 }
