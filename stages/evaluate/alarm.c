@@ -78,6 +78,11 @@ static double median_of(double *values, size_t count)
     return count ? 0.5 * (values[(count - 1) / 2] + values[count / 2]) : 0;
 }
 
+double npg_misfit_floor(int kind)
+{
+    return kinds[kind].floor;
+}
+
 npg_level npg_level_of(double *values, size_t count, double floor)
 {
     double usual = median_of(values, count);

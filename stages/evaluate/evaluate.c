@@ -96,6 +96,7 @@ static const char *const fault_texts[NPG_FAULTS] = {
     "share of the points that have no surface near them, in %,",
     "share of the surface without points near it, in %, unlike in other frames,",
     "mean distance of the surface to the points, in % of the diagonal, unlike in other frames,",
+    "share of the surface that is torn in one place, in %, unlike in other frames,",
     "motion since the frame before, in % of the diagonal, unlike in the frames around,"};
 
 /* What is wrong with a frame by itself.  A comparison with NaN fails, as it should, but for the support: there

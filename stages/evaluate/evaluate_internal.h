@@ -180,11 +180,16 @@ typedef struct npg_level {
 } npg_level;
 npg_level npg_level_of(double *values, size_t count, double floor);
 
+/* The floor of a misfit's bound (NPG_MISFIT_*). */
+double npg_misfit_floor(int kind);
+
 /* Verdict: faults that a frame has only beside the others of its capture.
  *
  *   uncovered  more of its surface in sight is without points than elsewhere in the capture (npg_level):
  *              the points of half the body are not there, and what the surface does there is a guess
  *   distance   its surface lies farther from the points than elsewhere, on average
+ *   torn       in one place its surface is stretched over where no points are, unlike elsewhere: a part was lost, or
+ *              is drawn to another part's points
  *   jump       the body is not where it was in the frame before, by far more than it moves in the frames
  *              around: a cut, a mirrored frame, another body.  Up to three odd frames after which it is where
  *              it was before are the ones at fault; else the frame behind the jump, as seen from the keyframe.

@@ -14,7 +14,7 @@ enum { AROUND = NPG_ALARM_FRAMES }; /* motions on either side that tell what is 
 
 typedef struct npg_verdict_record {
     int64_t index, number;
-    double uncovered, vertex_dist;
+    double uncovered, vertex_dist, torn, bare; /* the last two: of the largest place, of the area */
     float marks[3 * NPG_MARKS];
     int fault; /* NPG_FAULT_*: what the frame's own bars have found, then what is found here */
     bool is_late;
@@ -32,6 +32,8 @@ npg_status npg_verdict_add(npg_verdict *verdict, const npg_frame *frame)
                   .number = frame->number,
                   .uncovered = (double)(float)(1 - f->coverage), /* as a resumed run reads it back */
                   .vertex_dist = (double)(float)f->vertex_dist_mean,
+                  .torn = (double)(float)f->misfits[NPG_MISFIT_STRETCHED].share,
+                  .bare = (double)(float)f->misfits[NPG_MISFIT_UNSUPPORTED].share,
                   .fault = f->fault};
     memcpy(r->marks, f->marks, sizeof r->marks);
     return NPG_OK;
@@ -61,13 +63,18 @@ static void find_fault(record *r, int fault, double value, double bound)
 
 static npg_status judge_levels(npg_verdict *v, npg_level *dist)
 {
-    npg_level open;
+    npg_level open, torn, bare;
     NPG_TRY(level_of_all(&open, v, offsetof(record, uncovered), v->bars.uncovered));
     NPG_TRY(level_of_all(dist, v, offsetof(record, vertex_dist), v->bars.vertex_dist));
+    NPG_TRY(level_of_all(&torn, v, offsetof(record, torn), npg_misfit_floor(NPG_MISFIT_STRETCHED)));
+    NPG_TRY(level_of_all(&bare, v, offsetof(record, bare), npg_misfit_floor(NPG_MISFIT_UNSUPPORTED)));
     for (size_t i = 0; i < v->count; i++) {
         record *r = &v->records[i];
         find_fault(r, NPG_FAULT_UNCOVERED, r->uncovered, open.usual + open.bound);
         find_fault(r, NPG_FAULT_DISTANCE, r->vertex_dist, dist->usual + 2 * dist->bound);
+        /* Over a hole in the points surface stretches, too; no more of it is bare than of a hole elsewhere. */
+        if (NPG_CLEARLY * (r->bare - bare.usual) > bare.bound)
+            find_fault(r, NPG_FAULT_TORN, r->torn, torn.usual + torn.bound);
     }
     return NPG_OK;
 }

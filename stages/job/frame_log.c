@@ -98,9 +98,9 @@ void npg_frame_line_read(npg_figures *figures, const json_t *line)
 }
 
 /* Words of the faults; those of a bar are its name. */
-static const char *const fault_names[NPG_FAULTS] = {NULL,      "residual",  "residual",    "coverage",
-                                                    "flipped", "stretched", "unsupported", "nowhere",
-                                                    "lost",    "uncovered", "distance",    "jump"};
+static const char *const fault_names[NPG_FAULTS] = {
+    NULL,      "residual", "residual",  "coverage", "flipped", "stretched", "unsupported",
+    "nowhere", "lost",     "uncovered", "distance", "torn",    "jump"};
 
 static json_t *json_of_marks(const npg_figures *f)
 {

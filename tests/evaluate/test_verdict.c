@@ -86,6 +86,8 @@ static void what_is_usual_in_a_capture_is_no_fault(void **state)
     for (int t = 0; t < FRAMES; t++) {
         frames[t].figures.coverage = 0.6 + 0.02 * (t % 7); /* cameras that see parts */
         frames[t].figures.vertex_dist_mean = 0.03 + 0.01 * (t % 5);
+        frames[t].figures.misfits[NPG_MISFIT_STRETCHED].share = 0.01 * (t % 3); /* a body that folds */
+        frames[t].figures.misfits[NPG_MISFIT_UNSUPPORTED].share = 0.02 * (t % 3);
     }
     expect(0, 0, 0);
 }
@@ -98,6 +100,18 @@ static void a_surface_that_stands_off_its_points(void **state)
     expect(0, 0, 0);
     frames[0].figures.vertex_dist_mean = 0.068;
     expect(NPG_FAULT_DISTANCE, 0, 0);
+}
+
+static void a_web_in_one_frame(void **state)
+{
+    (void)state;
+    npg_misfit *misfits = frames[9].figures.misfits;
+    misfits[NPG_MISFIT_STRETCHED].share = 0.02; /* as over a hole in the points, where it is not bare */
+    expect(0, 0, 0);
+    misfits[NPG_MISFIT_UNSUPPORTED].share = 0.02;
+    expect(NPG_FAULT_TORN, 9, 9);
+    misfits[NPG_MISFIT_STRETCHED].share = 0.002; /* bare as it is, of what a sampling leaves out */
+    expect(0, 0, 0);
 }
 
 static void a_jump_there_and_back(void **state)
@@ -179,6 +193,7 @@ int main(void)
         cmocka_unit_test_setup(half_a_body_without_points, make_capture),
         cmocka_unit_test_setup(what_is_usual_in_a_capture_is_no_fault, make_capture),
         cmocka_unit_test_setup(a_surface_that_stands_off_its_points, make_capture),
+        cmocka_unit_test_setup(a_web_in_one_frame, make_capture),
         cmocka_unit_test_setup(a_jump_there_and_back, make_capture),
         cmocka_unit_test_setup(a_jump_for_good_is_the_fault_of_the_frame_behind_it, make_capture),
         cmocka_unit_test_setup(a_body_that_begins_to_move_or_stops_does_not_jump, make_capture),
