@@ -154,8 +154,8 @@ static double clearest(npg_alarm_cause *cause, const side *s, const record *r)
     select_misfits(counts, s, r, levels);
     for (int k = 0; k < NPG_MISFITS; k++) {
         double times = excess(r, levels, k) / levels[k].bound;
-        if (!counts[k] || !(times > -1) || (most > -1 && !is_clearer(k, times, cause->misfit, most)))
-            continue;
+        if (!counts[k]) times = fmin(times, 1); /* no sign by itself, but a change may begin so */
+        if (!(times > -1) || (most > -1 && !is_clearer(k, times, cause->misfit, most))) continue;
         most = times;
         *cause = (npg_alarm_cause){.seen_index = r->index,
                                    .seen_number = r->number,

@@ -39,7 +39,8 @@ void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float
  *   vacated      a part of the reference (one that hangs together) with fewer than 60 % of the points that
  *                are its share by area: it is gone, though its surface has found a place on another part's
  *                points, where it is neither unsupported nor stretched.  A point is its nearest part's; the
- *                share counts what is missing
+ *                share counts what is missing, of the area within NPG_SAMPLED spacings of points: a hole
+ *                in them is bare surface, not points that another part has
  *
  * reach = max(NPG_BEYOND spacings of the points on the surface, NPG_DETAIL_SHARE of the reference's diagonal), with noise
  * 2 NPG_WITHIN times the median distance of the points, but no more than twice as far; the places are the largest ones.
@@ -128,7 +129,8 @@ size_t npg_measure_memory(const npg_measure_settings *settings, size_t point_cou
  * Nor does a surface that has lost the points: that is a failed fit, which the quality bar reports.  It is
  * known by two signs.  Points and surface miss each other: then there is much of both far and unsupported,
  * so far counts only when its excess is more than twice that of unsupported, unsupported only when its excess
- * is more than twice that of far, and stretched and vacated only where far is less than suspect.  Or the
+ * is more than twice that of far, and stretched and vacated only where far is less than suspect.  What does not
+ * count makes a frame suspect at most: over a new part a surface is stretched as a whole at first.  Or the
  * points are off everywhere: unsupported, stretched and vacated don't count when the points' median distance
  * is above 0.4 % of the diagonal and above 3 times the keyframe's.  (A new part pulls the surface off the
  * points, too, so far counts there.)

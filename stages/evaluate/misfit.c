@@ -167,14 +167,14 @@ static npg_status find_stretched(npg_misfit_finder *f, npg_misfit *misfit, const
     return take_flagged(misfit, f, frame);
 }
 
-/* Area, middle and points of every part as it lies in this frame, of what is in sight.  Returns all of that
- * area. */
-static double sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame)
+/* Area, middle and points of every part as it lies in this frame, of what is in sight and has points no farther than
+ * `near`: the rest is bare, which is another misfit.  Returns all of that area. */
+static double sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame, double near)
 {
     double whole = 0;
     for (size_t i = 0; i < 5 * f->part_count; i++) f->part_sums[i] = 0;
     for (size_t v = 0; v < f->reference->vert_count; v++) {
-        if (!is_in_sight(frame, v)) continue;
+        if (!is_in_sight(frame, v) || (double)frame->vert_dist_sq[v] > near * near) continue;
         whole += frame->vert_areas[v];
         double *sum = f->part_sums + 5 * (size_t)f->part_of[v];
         sum[0] += frame->vert_areas[v];
@@ -186,10 +186,10 @@ static double sum_parts(npg_misfit_finder *f, const npg_misfit_frame *frame)
     return whole;
 }
 
-static void find_vacated(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame)
+static void find_vacated(npg_misfit_finder *f, npg_misfit *misfit, const npg_misfit_frame *frame, double near)
 {
     if (f->part_count < 2 || !frame->point_count) return;
-    double whole = sum_parts(f, frame);
+    double whole = sum_parts(f, frame, near);
     for (size_t p = 0; p < f->part_count; p++) {
         const double *sum = f->part_sums + 5 * p;
         if (!(sum[0] > 0)) continue;
@@ -212,7 +212,7 @@ npg_status npg_misfit_find(npg_misfit_finder *f, npg_misfit *misfits, const npg_
         misfits[i] = (npg_misfit){0, {(double)NAN, (double)NAN, (double)NAN}};
     NPG_TRY(find_far(f, &misfits[NPG_MISFIT_FAR], frame, reach, link));
     if (!f->is_closed) return NPG_OK;
-    find_vacated(f, &misfits[NPG_MISFIT_VACATED], frame);
+    find_vacated(f, &misfits[NPG_MISFIT_VACATED], frame, NPG_SAMPLED * spacing);
     flag_off(f, frame, reach);
     NPG_TRY(take_flagged(&misfits[NPG_MISFIT_UNSUPPORTED], f, frame));
     return find_stretched(f, &misfits[NPG_MISFIT_STRETCHED], frame, MOST_OF * reach);

@@ -422,6 +422,11 @@ static void a_part_without_points_of_its_own_is_vacated(void **state)
     find(m, &s);
     assert_true(fabs(m[NPG_MISFIT_VACATED].share - 0.3) < 0.05 && m[NPG_MISFIT_VACATED].at[1] > 0.5);
     assert_true(m[NPG_MISFIT_UNSUPPORTED].share == 0 && m[NPG_MISFIT_STRETCHED].share == 0);
+    for (size_t v = VERTS - 3 * HALF / 4; v < VERTS; v++)
+        s.vert_dist_sq[v] = 0.09f; /* a hole: most of it is bare */
+    find(m, &s);
+    assert_true(m[NPG_MISFIT_VACATED].share == 0 && m[NPG_MISFIT_UNSUPPORTED].share > 0);
+    memset(s.vert_dist_sq, 0, sizeof s.vert_dist_sq);
     for (size_t i = 0; i < VERTS; i++) s.hits[i].face = i % 3 ? lower : upper; /* 67 %: still its own */
     find(m, &s);
     assert_true(m[NPG_MISFIT_VACATED].share == 0);
