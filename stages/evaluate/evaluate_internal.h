@@ -116,8 +116,9 @@ size_t npg_measure_memory(const npg_measure_settings *settings, size_t point_cou
  * Each direction has a usual level of every misfit: median and median deviation of the last
  * explained frames, outward from the keyframe.  A frame is suspect when a misfit exceeds its level by half of
  *
- *     bound = max(floor, 2 NPG_BEYOND x 1.4826 x median deviation, median)
+ *     bound = max(floor, 2 NPG_BEYOND x 1.4826 x median deviation, median, NPG_CLEARLY x (quantile NPG_MOST - median))
  *
+ * (twice the floor next to the keyframe, where no more than NPG_ALARM_FRAMES say what is usual)
  * and unexplained when by all of it.  NPG_ALARM_FRAMES unexplained frames in a row raise the alarm (twice as
  * many where each is merely stretched: an alignment that slips does that, too, until it is found again),
  * if no more than twice as many suspect ones lead up to them: a topology changes at once, a fit that creeps

@@ -108,6 +108,17 @@ static double creep(int64_t index)
 {
     return index < 25 ? 0 : index < 37 ? 0.0095 : 0.012;
 }
+/* Holes, in all frames but the one that the reference is made from. */
+static double bare_all_along(int64_t index)
+{
+    return index == KEY ? 0 : 0.018 + 0.01 * chance(index);
+}
+/* Over holes, in a third of the frames, and then in more than the alarm needs. */
+static double torn_now_and_then(int64_t index)
+{
+    int64_t away = llabs(index - KEY);
+    return away % 3 == 2 || (away > 16 && away < 24) ? 0.012 : 0;
+}
 static double step_above_noise(int64_t index)
 {
     return noise(index) + (index >= 33 ? 0.4 : 0);
@@ -140,6 +151,13 @@ static void what_is_usual_or_passes_raises_none(void **state)
         expect(k, two_frames, -1, -1);
         expect(k, drift, -1, -1);
     }
+}
+
+static void holes_raise_none(void **state)
+{
+    (void)state;
+    expect(NPG_MISFIT_UNSUPPORTED, bare_all_along, -1, -1);
+    expect(NPG_MISFIT_STRETCHED, torn_now_and_then, -1, -1);
 }
 
 static void what_creeps_raises_none(void **state)
@@ -439,6 +457,7 @@ int main(void)
         cmocka_unit_test(a_lasting_misfit_raises_the_alarm),
         cmocka_unit_test(it_dates_from_the_first_suspect_frame),
         cmocka_unit_test(what_is_usual_or_passes_raises_none),
+        cmocka_unit_test(holes_raise_none),
         cmocka_unit_test(what_creeps_raises_none),
         cmocka_unit_test(a_surface_that_lost_the_points_raises_none),
         cmocka_unit_test(frames_without_figures_are_passed_over),
