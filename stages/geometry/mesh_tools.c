@@ -42,7 +42,7 @@ static void sort_by(npg_half_edge *out, const npg_half_edge *halves, size_t coun
     for (size_t i = 0; i < count; i++) out[start[by_hi ? halves[i].hi : halves[i].lo]++] = halves[i];
 }
 
-/* In turns by what counts least first, as each sort keeps the order before: qsort() takes ten times as long. */
+/* In turns by what counts least first, as each sort keeps the order before: less than half of the time of qsort(). */
 npg_status npg_mesh_half_edges(npg_half_edge **out, const uint32_t *faces, size_t face_count)
 {
     npg_arena scratch = {.purpose = NPG_FOR_MESH};

@@ -62,9 +62,12 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
 
 @test "the keyframe of a mesh of one's own is the frame that it is nearest to, from files and live" {
     mesh=$(ls "$PWD"/capture/truth/* | sed -n 4p)
-    "$NEUPIG" run capture/points -o own "${small[@]}" --bars residual=100 --reference "$mesh"
+    own() { # from the end of its swing the bar is torn on its way to the other, which is said
+        "$NEUPIG" run "$@" "${small[@]}" --bars residual=100 --reference "$mesh" || [ $? -eq 7 ]
+    }
+    own capture/points -o own
     key_is own 3
-    cat capture/points/* | "$NEUPIG" run - -o own-live "${small[@]}" --bars residual=100 --reference "$mesh"
+    cat capture/points/* | own - -o own-live
     key_is own-live 3
     cmp own/reference.ply own-live/reference.ply
 }

@@ -182,11 +182,11 @@ npg_up npg_rig_up(const npg_rig *rig)
         x -= pose[1]; /* images have y down */
         y -= pose[5];
         z -= pose[9];
-        across_y += pose[4];
-        across_z += pose[8];
+        across_y += fabs(pose[4]);
+        across_z += fabs(pose[8]);
     }
     /* They lie: across their images is up, or down, which they can't say. */
-    if (fabs(x) > fmax(fabs(y), fabs(z))) return fabs(across_y) >= fabs(across_z) ? NPG_UP_Y : NPG_UP_Z;
+    if (fabs(x) > fmax(fabs(y), fabs(z))) return across_y >= across_z ? NPG_UP_Y : NPG_UP_Z;
     if (fabs(y) >= fabs(z)) return y < 0 ? NPG_UP_MINUS_Y : NPG_UP_Y;
     return z < 0 ? NPG_UP_MINUS_Z : NPG_UP_Z;
 }
