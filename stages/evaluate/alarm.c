@@ -96,14 +96,12 @@ static npg_level level_of(const double *history, size_t ever, double floor)
     double values[HISTORY];
     size_t count = ever < HISTORY ? ever : HISTORY;
     memcpy(values, history, count * sizeof *values);
+    qsort(values, count, sizeof *values, npg_order_double);
+    double most = count ? values[(size_t)(NPG_MOST * (double)(count - 1))] : 0;
     /* The reference is made from the keyframe, which is better than usual; few others say what is. */
     npg_level level = npg_level_of(values, count, count > NPG_ALARM_FRAMES ? floor : NPG_CLEARLY * floor);
     /* What some frames have and most have not, as holes tear surface, has no median deviation. */
-    memcpy(values, history, count * sizeof *values);
-    qsort(values, count, sizeof *values, npg_order_double);
-    if (count)
-        level.bound =
-            fmax(level.bound, NPG_CLEARLY * (values[(size_t)(NPG_MOST * (double)(count - 1))] - level.usual));
+    level.bound = fmax(level.bound, NPG_CLEARLY * (most - level.usual));
     return level;
 }
 
