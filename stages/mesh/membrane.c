@@ -13,6 +13,7 @@
 #define PUSH          0.3  /* of a cube's side */
 #define PUSHES_MOST   10   /* of a vertex, in a sweep */
 #define WELL_IN       0.9  /* of a cube's value: not at the border */
+#define CLEAR         0.01 /* of a cube's side */
 #define SETTLED       1e-5 /* of the unit box: a sweep that moves nothing farther ends it */
 
 /* How far the vertex went. */
@@ -57,16 +58,28 @@ typedef struct moving {
     npg_mesh_neighbours r;
     uint8_t *kind;             /* V */
     const npg_cube_set *empty; /* or NULL */
-    float *normals;            /* V x 3, where there is an empty space */
+    npg_ray *inward;           /* V: from the flat surface, where there is an empty space */
+    npg_ray_hit *facing;       /* V: the side opposite, which is pushed the other way     */
 } moving;
+
+/* Whether a vertex that goes a step inward of the flat surface stays on its side of the middle. */
+static bool has_room(const moving *m, size_t v, double step)
+{
+    const npg_ray *way = &m->inward[v];
+    double gone = 0;
+    for (size_t a = 0; a < 3; a++)
+        gone += (double)(m->mesh->vert_pos[3 * v + a] - way->origin[a]) * (double)way->direction[a];
+    return gone + step <= (double)m->facing[v].t / 2;
+}
 
 /* A vertex in empty space goes inward, out of it; how far. */
 static double push(const moving *m, size_t v)
 {
-    double step = PUSH * (m->empty ? npg_cube_set_side(m->empty) : 0), moved = 0;
+    double step = PUSH * npg_cube_set_side(m->empty), moved = 0;
     float *x = &m->mesh->vert_pos[3 * v];
-    for (int i = 0; i < PUSHES_MOST && m->empty && npg_cube_set_value(m->empty, x) > NPG_MAJORITY; i++) {
-        for (size_t a = 0; a < 3; a++) x[a] -= (float)step * m->normals[3 * v + a];
+    for (int i = 0; i < PUSHES_MOST && npg_cube_set_value(m->empty, x) > NPG_MAJORITY; i++) {
+        if (!has_room(m, v, step)) break;
+        for (size_t a = 0; a < 3; a++) x[a] += (float)step * m->inward[v].direction[a];
         moved += step;
         m->kind[v] = PUSHED;
     }
@@ -84,12 +97,27 @@ static void sweep(const moving *m, int most, bool pushes)
     }
 }
 
-/* Inward is where the flat surface says: a surface on its way, folded for a moment, would push itself out. */
-static void push_out(const moving *m)
+/* Inward is where the flat surface says: a surface on its way, folded for a moment, would push itself out.  Between
+ * thin parts all is empty: what spans them would come out on the far side, but both sides meet in the middle. */
+static npg_status push_out(const moving *m, float *normals)
 {
     const npg_mesh *mesh = m->mesh;
-    npg_mesh_vertex_normals(m->normals, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
-    sweep(m, SWEEPS_PUSHED, true);
+    npg_surface *flat;
+    npg_mesh_vertex_normals(normals, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count);
+    for (size_t v = 0; v < mesh->vert_count; v++) {
+        npg_ray *way = &m->inward[v];
+        for (size_t a = 0; a < 3; a++) {
+            way->origin[a] = mesh->vert_pos[3 * v + a];
+            way->direction[a] = -normals[3 * v + a];
+        }
+        way->t_min = (float)(CLEAR * npg_cube_set_side(m->empty));
+        way->t_max = INFINITY;
+    }
+    NPG_TRY(npg_surface_open(&flat, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
+    npg_status status = npg_surface_rays(flat, m->facing, m->inward, mesh->vert_count, 1);
+    npg_surface_close(&flat);
+    if (!status) sweep(m, SWEEPS_PUSHED, true);
+    return status;
 }
 
 /* kind (V), of the vertices farther from all points than seen_dist: UNSEEN; *unseen: how many. */
@@ -115,14 +143,16 @@ npg_status npg_mesh_fair(npg_mesh *mesh, npg_faired *done, const float *points, 
     size_t n = mesh->vert_count, unseen = 0;
     *done = (npg_faired){0};
     m.kind = npg_arena_take(&scratch, n, sizeof *m.kind);
-    m.normals = npg_arena_take(&scratch, empty ? n : 0, 3 * sizeof *m.normals);
+    float *normals = npg_arena_take(&scratch, empty ? n : 0, 3 * sizeof *normals);
+    m.inward = npg_arena_take(&scratch, empty ? n : 0, sizeof *m.inward);
+    m.facing = npg_arena_take(&scratch, empty ? n : 0, sizeof *m.facing);
     uint32_t *ends = npg_arena_take(&scratch, n, sizeof *ends);
     npg_status status = npg_arena_status(&scratch);
     if (!status) status = find_unseen(m.kind, &unseen, mesh, points, point_count, seen_dist);
     if (!status && unseen) status = npg_mesh_neighbours_open(&m.r, mesh);
     if (!status && unseen) done->moved = reach(m.kind, ends, &m.r, n);
     if (done->moved) sweep(&m, SWEEPS_MOST, false);
-    if (done->moved && empty) push_out(&m);
+    if (done->moved && empty) status = push_out(&m, normals);
     for (size_t v = 0; v < n && done->moved; v++) done->pushed += m.kind[v] == PUSHED;
     npg_mesh_neighbours_close(&m.r);
     npg_arena_release(&scratch);

@@ -16,7 +16,7 @@
 #define HOLE 0.5 /* radius of what is not seen */
 
 typedef struct seen {
-    float points[3 * SIDE * SIDE];
+    float points[2 * 3 * SIDE * SIDE];
     size_t count;
 } seen;
 
@@ -152,6 +152,48 @@ static void what_lies_in_empty_space_is_pushed_out_of_it(void **state)
     assert_int_equal(npg_memory_used(), 0);
 }
 
+/* Two sheets, back to back, that no point saw in their middle, where all is empty: as between two fingers. */
+static npg_mesh *web(seen *s)
+{
+    npg_mesh *mesh;
+    const size_t verts = SIDE * SIDE, faces = 2 * (SIDE - 1) * (SIDE - 1);
+    npg_mesh *sheet = bulged(s, 0, 0);
+    assert_int_equal(npg_mesh_open(&mesh, 2 * verts, 2 * faces), NPG_OK);
+    s->count = 0;
+    for (size_t v = 0; v < 2 * verts; v++) {
+        float *at = mesh->vert_pos + 3 * v;
+        memcpy(at, sheet->vert_pos + 3 * (v % verts), 2 * sizeof *at);
+        at[2] = v < verts ? 0.1F : -0.1F;
+        if (!is_in_hole((double)at[0], (double)at[1])) memcpy(s->points + 3 * s->count++, at, 3 * sizeof *at);
+    }
+    for (size_t i = 0; i < 3 * faces; i++) {
+        mesh->faces[i] = sheet->faces[i];
+        mesh->faces[3 * faces + i] = (uint32_t)verts + sheet->faces[i - i % 3 + 2 - i % 3];
+    }
+    npg_mesh_unref(&sheet);
+    return mesh;
+}
+
+static void two_sides_that_are_pushed_meet_in_the_middle(void **state)
+{
+    static seen s;
+    npg_mesh *mesh = web(&s);
+    npg_cube_set *empty = bowl(0.02, -0.5);
+    npg_faired done;
+    (void)state;
+    assert_int_equal(npg_mesh_fair(mesh, &done, s.points, s.count, 0.5 * STEP, empty), NPG_OK);
+    assert_true(done.pushed > 0);
+    for (size_t v = 0; v < mesh->vert_count; v++) {
+        const float *at = mesh->vert_pos + 3 * v;
+        float height = v < mesh->vert_count / 2 ? at[2] : -at[2];
+        if (hypot((double)at[0], (double)at[1]) < 0.1) assert_true(height < 0.05F);
+        assert_true(height > -0.001F);
+    }
+    npg_cube_set_close(&empty);
+    npg_mesh_unref(&mesh);
+    assert_int_equal(npg_memory_used(), 0);
+}
+
 /* The upper half of a ball, and a whole one above it. */
 static npg_mesh *shell_and_ball(size_t *shell_verts)
 {
@@ -261,6 +303,7 @@ int main(void)
         cmocka_unit_test(nothing_moves_where_all_is_seen_or_nothing),
         cmocka_unit_test(a_piece_that_no_point_saw_keeps_its_shape),
         cmocka_unit_test(what_lies_in_empty_space_is_pushed_out_of_it),
+        cmocka_unit_test(two_sides_that_are_pushed_meet_in_the_middle),
         cmocka_unit_test(a_shell_gets_a_back_and_a_ball_stays),
         cmocka_unit_test(a_back_without_memory_is_reported),
         cmocka_unit_test(memory_that_fails_is_reported),
