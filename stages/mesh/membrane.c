@@ -13,7 +13,6 @@
 #define PUSH          0.3  /* of a cube's side */
 #define PUSHES_MOST   10   /* of a vertex, in a sweep */
 #define WELL_IN       0.9  /* of a cube's value: not at the border */
-#define CLEAR         0.01 /* of a cube's side */
 #define SETTLED       1e-5 /* of the unit box: a sweep that moves nothing farther ends it */
 
 /* How far the vertex went. */
@@ -110,7 +109,7 @@ static npg_status push_out(const moving *m, float *normals)
             way->origin[a] = mesh->vert_pos[3 * v + a];
             way->direction[a] = -normals[3 * v + a];
         }
-        way->t_min = (float)(CLEAR * npg_cube_set_side(m->empty));
+        way->t_min = (float)(NPG_FEW * npg_cube_set_side(m->empty));
         way->t_max = INFINITY;
     }
     NPG_TRY(npg_surface_open(&flat, mesh->vert_pos, mesh->vert_count, mesh->faces, mesh->face_count));
