@@ -38,10 +38,13 @@ npg_status npg_clean_check(const npg_frame *frame);
 /* Outliers: the points of a cloud that lie farther from their neighbours than others do.
  *
  * Based on: R. B. Rusu et al., Towards 3D Point Cloud Based Object Maps for Household Environments, 2008 (the
- * filter that PCL has as StatisticalOutlierRemoval; the verdicts are the same). */
+ * filter that PCL has as StatisticalOutlierRemoval; but for scattered points the verdicts are the same), and on: E.
+ * Levina, P. J. Bickel, Maximum Likelihood Estimation of Intrinsic Dimension, NIPS 2004. */
 
 /* keep[i] = 0 for the isolated ones of points (N x 3, finite, N > 0), else 1: those whose mean distance to
- * their `neighbours` nearest points is more than `ratio` standard deviations above the mean of all points.
+ * their `neighbours` nearest points is more than `ratio` standard deviations above the mean of all points.  Points
+ * clearly farther apart than most, which are no surface but scattered in space, count for neither: a tenth of
+ * the points would be enough to hide each other.
  * This is asked again of what is left until there are no more (NPG_ROUNDS_MOST at most): far outliers raise mean
  * and deviation and so hide the near ones from the first round.  A round searches only where the one before
  * took a neighbour away.  Uses `threads` threads (0: one per core); the result does not depend on it.

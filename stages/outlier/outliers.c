@@ -3,19 +3,25 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "pipeline/memory.h"
+#include "pipeline/order.h"
 #include "pipeline/parallel.h"
 
-#define ROUNDS 8 /* of the filter, each on what the one before has left; set by trial */
+#define ROUNDS    8   /* of the filter, each on what the one before has left; set by trial */
+#define DIMENSION 2.5 /* of points: a surface's is 2, of what is scattered in space 3 */
 
 typedef struct filter {
     const float *points;
     size_t count, left, neighbours;
     npg_kdtree *tree;
     float *mean, *far_sq; /* N each, owned: of the distances to the neighbours; to the last of them */
+    float *spread;        /* N, owned: 1 / the dimension of the points around */
+    float *sorted;        /* N, owned: of those that are left, the mean */
     uint8_t *is_asked;    /* N, owned: a neighbour of the point is gone */
     uint8_t *keep;        /* N, a loan */
     int threads;
@@ -25,6 +31,8 @@ static npg_status open_filter(filter *f)
 {
     NPG_TRY(npg_alloc_array(&f->mean, NPG_FOR_FRAMES, f->count, sizeof *f->mean));
     NPG_TRY(npg_alloc_array(&f->far_sq, NPG_FOR_FRAMES, f->count, sizeof *f->far_sq));
+    NPG_TRY(npg_alloc_array(&f->spread, NPG_FOR_FRAMES, f->count, sizeof *f->spread));
+    NPG_TRY(npg_alloc_array(&f->sorted, NPG_FOR_FRAMES, f->count, sizeof *f->sorted));
     NPG_TRY(npg_alloc(&f->is_asked, NPG_FOR_FRAMES, f->count));
     return npg_kdtree_open(&f->tree, f->points, f->count);
 }
@@ -34,30 +42,59 @@ static void close_filter(filter *f)
     npg_kdtree_close(&f->tree);
     npg_release(&f->mean);
     npg_release(&f->far_sq);
+    npg_release(&f->spread);
+    npg_release(&f->sorted);
     npg_release(&f->is_asked);
 }
 
-/* An npg_kdtree_visit: the point itself is the first of its neighbours. */
+/* An npg_kdtree_visit: the point itself is the first of its neighbours.  Around a point of a set of dimension d the
+ * number of others grows with the distance to the power of d; of K neighbours
+ *     1 / d = sum_k ln(r_K / r_k) / (K - 2)
+ * (Levina and Bickel 2004, their equation 8 without its bias), to be averaged over points. */
 static void measure(void *user, uint32_t point, const uint32_t *index, const float *dist_sq)
 {
     const filter *f = user;
-    double sum = 0;
+    double sum = 0, farther = 1;
     (void)index;
-    for (size_t k = 1; k <= f->neighbours; k++) sum += sqrt((double)dist_sq[k]);
+    for (size_t k = 1; k <= f->neighbours; k++) {
+        sum += sqrt((double)dist_sq[k]);
+        farther *= (double)dist_sq[f->neighbours] / (double)dist_sq[k];
+    }
     f->mean[point] = (float)(sum / (double)f->neighbours);
     f->far_sq[point] = dist_sq[f->neighbours];
+    f->spread[point] = (float)(log(farther) / 2 / fmax(1, (double)f->neighbours - 2));
+}
+
+/* The mean distance beyond which points are scattered in space, if there are such: what lies clearly farther from each
+ * other than most do, and not on a surface.  Many of them make each other look usual. */
+static double scattered_from(const filter *f)
+{
+    double spread = 0;
+    size_t count = 0;
+    for (size_t i = 0; i < f->count; i++)
+        if (f->keep[i]) f->sorted[count++] = f->mean[i];
+    qsort(f->sorted, count, sizeof *f->sorted, npg_order_float);
+    double far = NPG_CLEARLY * (double)f->sorted[count / 2];
+    count = 0;
+    for (size_t i = 0; i < f->count; i++) {
+        if (!f->keep[i] || !((double)f->mean[i] > far)) continue;
+        spread += (double)f->spread[i];
+        count++;
+    }
+    return DIMENSION * spread < (double)count ? far : (double)INFINITY;
 }
 
 /* The mean distance above which a point is isolated. */
 static double threshold_of(const filter *f, double ratio)
 {
-    double sum = 0, sum_sq = 0, n = (double)f->left;
+    double sum = 0, sum_sq = 0, n = 0, far = scattered_from(f);
     for (size_t i = 0; i < f->count; i++) {
-        if (!f->keep[i]) continue;
+        if (!f->keep[i] || (double)f->mean[i] > far) continue;
         sum += (double)f->mean[i];
         sum_sq += (double)(f->mean[i] * f->mean[i]);
+        n++;
     }
-    double variance = (sum_sq - sum * sum / n) / (n - 1);
+    double variance = n > 1 ? (sum_sq - sum * sum / n) / (n - 1) : 0;
     return sum / n + ratio * sqrt(variance > 0 ? variance : 0);
 }
 
@@ -117,7 +154,7 @@ npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, i
 
 size_t npg_find_isolated_memory(size_t count)
 {
-    return npg_kdtree_memory(count) + count * (2 * sizeof(float) + 1 + 3 * sizeof(float));
+    return npg_kdtree_memory(count) + count * (4 * sizeof(float) + 1 + 3 * sizeof(float));
 }
 
 /* ---- several frames ---- */

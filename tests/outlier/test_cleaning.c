@@ -84,7 +84,7 @@ static npg_status drop_isolated(npg_frame *frame)
     return npg_isolated_drop(&frame, 1, 12, 5);
 }
 
-static void isolated_points_go_and_others_stay(void **state)
+static void of_a_clean_cloud_hardly_any_go(void **state)
 {
     (void)state;
     npg_frame frame;
@@ -92,11 +92,16 @@ static void isolated_points_go_and_others_stay(void **state)
     assert_int_equal(drop_isolated(&frame), NPG_OK);
     assert_true(frame.cleaning.isolated <= 50); /* of a clean cloud, 0.5 % at most */
     npg_frame_clear(&frame);
+}
 
+/* 10 000 points, that many of them anywhere: those far from the torus go, its own stay. */
+static void drop_scattered(size_t scattered)
+{
+    npg_frame frame;
     shape_random r = {6};
     size_t near = 0, far = 0;
     open_frame(&frame, 10000, 7);
-    for (size_t i = 0; i < 300; i++) {
+    for (size_t i = 0; i < scattered; i++) {
         float *p = frame.pos_local + 3 * i;
         for (int a = 0; a < 3; a++) p[a] = (float)(4 * shape_uniform(&r) - 2);
     }
@@ -106,10 +111,33 @@ static void isolated_points_go_and_others_stay(void **state)
         const float *p = frame.pos_local + 3 * i;
         double off = fabs(hypot(hypot((double)p[0], (double)p[1]) - 1, (double)p[2]) - 0.3);
         near += off < 0.001;
-        far += off > 0.15;
+        far += off > 0.3;
     }
     assert_int_equal(far, 0);
-    assert_true(near > 9700 * 0.995);
+    assert_true((double)near > (double)(10000 - scattered) * 0.99);
+    npg_frame_clear(&frame);
+}
+
+/* So many that they make each other look usual, too. */
+static void scattered_points_go_few_or_many(void **state)
+{
+    (void)state;
+    for (size_t scattered = 300; scattered <= 3000; scattered *= 10) drop_scattered(scattered);
+}
+
+/* Of half of the body a sixth: its points lie apart, too, but on a surface. */
+static void a_side_of_few_points_stays(void **state)
+{
+    (void)state;
+    npg_frame frame;
+    size_t count = 0;
+    open_frame(&frame, 10000, 8);
+    for (size_t i = 0; i < frame.point_count; i++)
+        if (frame.pos_local[3 * i] < 0 || i % 6 == 0)
+            memmove(frame.pos_local + 3 * count++, frame.pos_local + 3 * i, 3 * sizeof(float));
+    frame.point_count = count;
+    assert_int_equal(drop_isolated(&frame), NPG_OK);
+    assert_in_range(frame.cleaning.isolated, 0, count / 200);
     npg_frame_clear(&frame);
 }
 
@@ -276,14 +304,12 @@ static void a_sensor_that_is_none_is_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_not_a_number_goes),
-                                       cmocka_unit_test(duplicates_go),
-                                       cmocka_unit_test(too_many_points_are_thinned),
-                                       cmocka_unit_test(isolated_points_go_and_others_stay),
-                                       cmocka_unit_test(frames_are_searched_together),
-                                       cmocka_unit_test(what_is_no_surface_is_refused),
-                                       cmocka_unit_test(refused_memory_is_survived),
-                                       cmocka_unit_test(the_stage_skips_or_refuses),
-                                       cmocka_unit_test(a_sensor_that_is_none_is_refused)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_not_a_number_goes),       cmocka_unit_test(duplicates_go),
+        cmocka_unit_test(too_many_points_are_thinned),     cmocka_unit_test(of_a_clean_cloud_hardly_any_go),
+        cmocka_unit_test(scattered_points_go_few_or_many), cmocka_unit_test(a_side_of_few_points_stays),
+        cmocka_unit_test(frames_are_searched_together),    cmocka_unit_test(what_is_no_surface_is_refused),
+        cmocka_unit_test(refused_memory_is_survived),      cmocka_unit_test(the_stage_skips_or_refuses),
+        cmocka_unit_test(a_sensor_that_is_none_is_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
