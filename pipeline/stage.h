@@ -101,6 +101,8 @@ typedef struct npg_facts {
     /* keyframe */
     size_t point_count_max;         /* of all frames, as read */
     bool has_normals;               /* all frames with points, as read */
+    size_t sensor_count_max;        /* of all frames; 0: where sensors stood is not known */
+    size_t view_count_max;          /* those of them whose images are known               */
     int64_t number_min, number_max; /* of all frames          */
     npg_bounds bounds_local;        /* of all usable points   */
     npg_frame_box box;
@@ -109,9 +111,7 @@ typedef struct npg_facts {
     npg_choice choice;                   /* what the choosing pass should look at                           */
     size_t own_verts;                    /* vertices of the user's own mesh; 0: the reference is to be made */
     /* reference */
-    npg_brief brief;         /* between passes */
-    size_t sensor_count_max; /* of all frames; 0: where sensors stood is not known */
-    size_t view_count_max;   /* those of them whose images are known               */
+    npg_brief brief; /* between passes */
     /* align, at the end of a fusing pass */
     int64_t
         unreached_count; /* frames that see too much that the reference does not have, and those beyond them */

@@ -188,8 +188,9 @@ double npg_misfit_floor(int kind);
 
 /* Verdict: faults that a frame has only beside the others of its capture.
  *
- *   uncovered  more of its surface in sight is without points than elsewhere in the capture (npg_level):
- *              the points of half the body are not there, and what the surface does there is a guess
+ *   uncovered  more of its surface in sight is without points than elsewhere in the capture: the points of a part
+ *              are not there, or the part is not where they are.  Above npg_level where sensors are known, else above
+ *              twice what a quarter of the frames keeps to, and of a few more
  *   distance   its surface lies farther from the points than elsewhere, on average
  *   torn       in one place its surface is stretched over where no points are, unlike elsewhere: a part was lost, or
  *              is drawn to another part's points
@@ -203,6 +204,7 @@ typedef struct npg_verdict_bars {
     double uncovered;   /* share of the surface, the least that counts; 1: nothing does */
     double vertex_dist; /* the same in diagonals                                        */
     double jump;        /* the same                                                     */
+    bool is_seen_from;  /* it is known where sensors stood                              */
 } npg_verdict_bars;
 
 typedef struct npg_verdict {

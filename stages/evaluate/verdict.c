@@ -41,13 +41,31 @@ npg_status npg_verdict_add(npg_verdict *verdict, const npg_frame *frame)
 
 /* ---- beside what is usual in the capture ---- */
 
+static npg_status values_of_all(double **values, const npg_verdict *v, size_t offset)
+{
+    NPG_TRY(npg_alloc_array(values, NPG_FOR_RUN, v->count, sizeof **values));
+    for (size_t i = 0; i < v->count; i++)
+        (*values)[i] = *(const double *)((const char *)&v->records[i] + offset);
+    return NPG_OK;
+}
+
 static npg_status level_of_all(npg_level *level, const npg_verdict *v, size_t offset, double floor)
 {
     double *values;
-    NPG_TRY(npg_alloc_array(&values, NPG_FOR_RUN, v->count, sizeof *values));
-    for (size_t i = 0; i < v->count; i++)
-        values[i] = *(const double *)((const char *)&v->records[i] + offset);
+    NPG_TRY(values_of_all(&values, v, offset));
     *level = npg_level_of(values, v->count, floor);
+    npg_release(&values);
+    return NPG_OK;
+}
+
+/* The share without points that a frame may have.  Half of the frames may be wrong, but hardly three of four; holes in
+ * the points differ less than that. */
+static npg_status judge_holes(double *bound, const npg_verdict *v)
+{
+    double *values;
+    NPG_TRY(values_of_all(&values, v, offsetof(record, uncovered)));
+    qsort(values, v->count, sizeof *values, npg_order_double);
+    *bound = NPG_CLEARLY * (values[v->count / 4] + NPG_FEW * 2 * v->bars.uncovered);
     npg_release(&values);
     return NPG_OK;
 }
@@ -64,13 +82,16 @@ static void find_fault(record *r, int fault, double value, double bound)
 static npg_status judge_levels(npg_verdict *v, npg_level *dist)
 {
     npg_level open, torn, bare;
+    double most;
     NPG_TRY(level_of_all(&open, v, offsetof(record, uncovered), v->bars.uncovered));
     NPG_TRY(level_of_all(dist, v, offsetof(record, vertex_dist), v->bars.vertex_dist));
     NPG_TRY(level_of_all(&torn, v, offsetof(record, torn), npg_misfit_floor(NPG_MISFIT_STRETCHED)));
     NPG_TRY(level_of_all(&bare, v, offsetof(record, bare), npg_misfit_floor(NPG_MISFIT_UNSUPPORTED)));
+    NPG_TRY(judge_holes(&most, v));
+    if (v->bars.is_seen_from) most = open.usual + open.bound; /* a side that turns away is no hole */
     for (size_t i = 0; i < v->count; i++) {
         record *r = &v->records[i];
-        find_fault(r, NPG_FAULT_UNCOVERED, r->uncovered, open.usual + open.bound);
+        find_fault(r, NPG_FAULT_UNCOVERED, r->uncovered, most);
         find_fault(r, NPG_FAULT_DISTANCE, r->vertex_dist, dist->usual + 2 * dist->bound);
         /* Over a hole in the points surface stretches, too; no more of it is bare than of a hole elsewhere. */
         if (NPG_CLEARLY * (r->bare - bare.usual) > bare.bound)

@@ -75,6 +75,10 @@ static npg_status measure_frame(npg_worker *worker, const npg_frame *frame)
     if (frame->number > facts->number_max) *npg_own(worker, number_max) = frame->number;
     if (frame->point_count > facts->point_count_max) *npg_own(worker, point_count_max) = frame->point_count;
     if (frame->point_count && !frame->normals) *npg_own(worker, has_normals) = false;
+    if (frame->sensor_count > facts->sensor_count_max)
+        *npg_own(worker, sensor_count_max) = frame->sensor_count;
+    if (frame->views && frame->sensor_count > facts->view_count_max)
+        *npg_own(worker, view_count_max) = frame->sensor_count;
     if (frame->is_skipped) return NPG_OK;
     state->usable_count++;
     for (size_t i = 0; i < frame->point_count; i++)
@@ -467,6 +471,7 @@ static npg_status init(npg_worker *worker)
     if (pass == NPG_PASS_MEASURE) {
         *npg_own(worker, bounds_local) = npg_bounds_empty();
         *npg_own(worker, point_count_max) = 0;
+        *npg_own(worker, sensor_count_max) = *npg_own(worker, view_count_max) = 0;
         *npg_own(worker, has_normals) = true;
         *npg_own(worker, number_min) = INT64_MAX;
         *npg_own(worker, number_max) = INT64_MIN;

@@ -21,9 +21,8 @@ enum { FROM_KEY, FROM_ALL };
 typedef struct state {
     int from;                 /* option */
     int64_t rounds, attempts; /* options */
-    int64_t usable; /* frames with points, and most sensors and images of one: of the measuring pass */
-    size_t sensors, views;
-    npg_judging *judging; /* of the keyframe that is tried; NULL: it stays in any case */
+    int64_t usable;           /* frames with points: of the measuring pass */
+    npg_judging *judging;     /* of the keyframe that is tried; NULL: it stays in any case */
 } state;
 
 #define AT(member) offsetof(state, member)
@@ -69,8 +68,6 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
         const npg_frame *frame = npg_chunk_frame(*chunk, i);
         if (npg_worker_pass(worker) == NPG_PASS_MEASURE) {
             s->usable += !frame->is_skipped;
-            if (frame->sensor_count > s->sensors) s->sensors = frame->sensor_count;
-            if (frame->views && frame->sensor_count > s->views) s->views = frame->sensor_count;
         } else if (npg_worker_pass(worker) == NPG_PASS_FUSE && !frame->is_skipped && frame->point_count) {
             NPG_TRY(judge(worker, frame->index, frame->vert_unit));
         }
@@ -183,8 +180,6 @@ static npg_status begin(npg_worker *worker)
     NPG_TRY(npg_alloc(&loop, NPG_FOR_MESH, sizeof *loop));
     npg_worker_keep(worker, loop, NULL);
     *npg_own(worker, brief) = npg_reference_begin(loop, s->usable > 1 ? s->rounds : 0, (size_t)s->attempts);
-    *npg_own(worker, sensor_count_max) = s->sensors;
-    *npg_own(worker, view_count_max) = s->views;
     return NPG_OK;
 }
 

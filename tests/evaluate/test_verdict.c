@@ -15,11 +15,13 @@
 enum { FRAMES = 20, KEY = 5 };
 
 static npg_frame frames[FRAMES];
+static bool is_seen_from; /* sensors are known */
 
 /* A body that goes forward by 1 % of its size a frame, of which all is covered but 2 %. */
 static int make_capture(void **state)
 {
     (void)state;
+    is_seen_from = false;
     memset(frames, 0, sizeof frames);
     for (int t = 0; t < FRAMES; t++) {
         frames[t].index = t;
@@ -41,7 +43,7 @@ static void move(int from, int to, float by)
 /* The faults of the first `count` frames: their kinds, by index; 0 where there is none. */
 static void judge(int faults[FRAMES], int count)
 {
-    npg_verdict verdict = {.bars = {0.25, 0.01, 0.005}, .key = KEY};
+    npg_verdict verdict = {.bars = {0.25, 0.01, 0.005, is_seen_from}, .key = KEY};
     npg_late_faults late;
     memset(faults, 0, FRAMES * sizeof *faults);
     for (int i = 0; i < count; i++) /* in no order */
@@ -80,6 +82,18 @@ static void half_a_body_without_points(void **state)
     expect(0, 0, 0);
 }
 
+/* Legs that change places: in half of the frames and more, and no hole tells of it but in the best ones. */
+static void a_part_without_points_in_every_other_frame(void **state)
+{
+    int faults[FRAMES];
+    (void)state;
+    for (int t = 0; t < FRAMES; t += 2) frames[t].figures.coverage = 0.9;
+    judge(faults, FRAMES);
+    for (int t = 0; t < FRAMES; t++) assert_int_equal(faults[t], t % 2 ? 0 : NPG_FAULT_UNCOVERED);
+    is_seen_from = true; /* a side that turns away */
+    expect(0, 0, 0);
+}
+
 static void what_is_usual_in_a_capture_is_no_fault(void **state)
 {
     (void)state;
@@ -95,6 +109,7 @@ static void what_is_usual_in_a_capture_is_no_fault(void **state)
 static void a_surface_that_stands_off_its_points(void **state)
 {
     (void)state;
+    is_seen_from = true;
     frames[0].figures.coverage = 0.8;
     frames[0].figures.vertex_dist_mean = 0.02; /* of points that are seen less well */
     expect(0, 0, 0);
@@ -191,6 +206,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(an_even_capture_has_no_fault, make_capture),
         cmocka_unit_test_setup(half_a_body_without_points, make_capture),
+        cmocka_unit_test_setup(a_part_without_points_in_every_other_frame, make_capture),
         cmocka_unit_test_setup(what_is_usual_in_a_capture_is_no_fault, make_capture),
         cmocka_unit_test_setup(a_surface_that_stands_off_its_points, make_capture),
         cmocka_unit_test_setup(a_web_in_one_frame, make_capture),
