@@ -66,12 +66,6 @@ typedef struct choosing {
     size_t count;
 } choosing;
 
-/* A frame of which no surface can be made is no keyframe; that is no failure of the run. */
-static bool is_fatal(npg_status status)
-{
-    return status && status != NPG_BAD_INPUT && status != NPG_FAILED && status != NPG_DIVERGED;
-}
-
 static npg_status try_one(const choosing *c, npg_candidate *one)
 {
     const npg_candidate_cloud *cloud = &c->clouds->list[one->at];
@@ -91,8 +85,8 @@ static npg_status try_part(void *user, size_t part)
     const choosing *c = user;
     npg_candidate *one = &c->list[part];
     npg_status status = try_one(c, one);
-    return is_fatal(status) ? npg_error_prefix(status, "frame %lld as a keyframe", (long long)one->number)
-                            : NPG_OK;
+    if (npg_mesh_is_none(status)) return NPG_OK;
+    return npg_error_prefix(status, "frame %lld as a keyframe", (long long)one->number);
 }
 
 static void list_candidates(choosing *c)

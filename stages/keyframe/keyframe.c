@@ -406,7 +406,8 @@ static npg_status settle(npg_worker *worker)
     if (facts->brief.compares)
         npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count,
                             npg_worker_kept(worker), false);
-    if (npg_worker_pass(worker) != NPG_PASS_FUSE || key < 0 || key == facts->plan.key) return NPG_OK;
+    if (npg_worker_pass(worker) != NPG_PASS_FUSE && !facts->brief.is_attempt) return NPG_OK;
+    if (key < 0 || key == facts->plan.key) return NPG_OK;
     int64_t number = clouds->list[npg_candidate_clouds_find(clouds, key)].number;
     npg_own(worker, plan)->key = key;
     json_object_set_new(npg_worker_report(worker), "key",

@@ -398,11 +398,14 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     if (!status) status = colour_reference(&m);
     npg_mesh_note(worker, "seconds", npg_clock_s() - since);
     npg_point_set_close(&m.set);
-    if (status) npg_mesh_unref(&m.mesh);
-    npg_mesh_unref(npg_own(worker, reference));
-    *npg_own(worker, reference) = m.mesh;
-    *npg_own(worker, reference_key) = key->index;
-    if (!status) npg_worker_close_report(worker);
+    if (!status) {
+        npg_mesh_unref(npg_own(worker, reference));
+        *npg_own(worker, reference) = m.mesh;
+        *npg_own(worker, reference_key) = key->index;
+        npg_worker_close_report(worker);
+    } else {
+        npg_mesh_unref(&m.mesh);
+    }
     return npg_error_prefix(status, "keyframe %lld (%s)", (long long)key->number,
                             key->path ? key->path : "pushed");
 }
@@ -419,6 +422,10 @@ static npg_status make_of_pass(npg_worker *worker, const npg_frame *key)
         return npg_error(NPG_BAD_INPUT, "keyframe %lld has no usable points", (long long)key->number);
     npg_status status = make_reference(worker, key, fused);
     npg_fused_close(&fused);
+    if (npg_worker_facts(worker)->brief.is_attempt && npg_mesh_is_none(status)) {
+        npg_worker_log(worker, NPG_LOG_INFO, key->number, "can't be the keyframe: %s", npg_error_text());
+        status = NPG_OK; /* stage reference tells by reference_key, and takes it back */
+    }
     s->is_made = !status;
     return status;
 }

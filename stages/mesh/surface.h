@@ -72,6 +72,12 @@ npg_status npg_poisson(npg_mesh **mesh, const float *points, const float *normal
 npg_status npg_poisson_apart(npg_mesh **mesh, size_t *moved, const float *points, const float *normals,
                              size_t point_count, double spacing, const npg_poisson_settings *settings);
 
+/* Whether of points no surface can be made.  Of a frame that is tried as the keyframe that is no failure of the run. */
+static inline bool npg_mesh_is_none(npg_status status)
+{
+    return status == NPG_BAD_INPUT || status == NPG_FAILED || status == NPG_DIVERGED;
+}
+
 /* Draft: a coarse surface with normals, as npg_poisson_apart() makes it of few cells, in its main pieces.
  * is_side: sensors saw the points, and what they did not see is none of it.  The same errors. */
 npg_status npg_mesh_draft(npg_mesh **mesh, const float *points, const float *normals, size_t point_count,

@@ -54,6 +54,14 @@ bad_frames() {
     [ "$(bad_frames other | cut -d ' ' -f 1)" = 7 ]
 }
 
+@test "a frame in pieces is tried as the keyframe, and taken back" {
+    change bar pieces '$1 == "v" && n == 7 { for (a = 2; a <= 4; a++) $a = 0.1 * $a + int(NR % 9 / 3 ^ (a - 2)) % 3 * 0.4 } { print }'
+    run_it 7 pieces --faces 800 --method '{"epochs": 10, "poisson-depth": 5, "align-nodes": 100, "align-steps": 10}' --bars residual=1
+    grep -q "frame 7: can't be the keyframe: .*: the mesh is in [0-9]* pieces" pieces.log
+    grep -q 'with this keyframe 12 frames are below the bar: the one before is taken back' pieces.log
+    [ "$(bad_frames pieces | cut -d ' ' -f 1)" = 7 ]
+}
+
 @test "mirrored from the middle on: the frame where that begins" {
     change walker mirrored '$1 == "v" && n >= 6 { $2 = -$2 } { print }'
     run_it 7 mirrored --faces 1500 --keyframe 3 --method '{"poisson-depth": 6, "reference-from": "key"}'
