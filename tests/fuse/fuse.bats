@@ -13,7 +13,9 @@ setup_file() {
     "$NEUPIG-bodies" --body bar --frames 10 --points 1200 --cameras 2 --width 64 --cycles 0.5 -o parts >synth.log
     for capture in noisy noisy1 noisy2 parts; do
         for from in key all; do
-            "$NEUPIG" run $capture/points -o $capture-$from --method "{\"reference-from\": \"$from\"}" "${small[@]}" >$capture-$from.log 2>&1
+            # 7: so coarse a run loses the ends of the swing, and says so
+            "$NEUPIG" run $capture/points -o $capture-$from --method "{\"reference-from\": \"$from\"}" "${small[@]}" >$capture-$from.log 2>&1 ||
+                [ $? -eq 7 ]
         done
     done
 }
