@@ -194,9 +194,10 @@ static npg_status judge_together(npg_worker *worker)
     evaluate_state *state = npg_worker_state(worker);
     npg_late_faults *late;
     state->verdict.key = npg_worker_facts(worker)->plan.key;
-    state->verdict.bars = (npg_verdict_bars){
-        (1 - state->coverage_min / 100) / 2, fmax(state->measured.cover_dist, state->residual_max) / 100,
-        state->residual_max / 100, npg_worker_facts(worker)->sensor_count_max > 0};
+    state->verdict.bars =
+        (npg_verdict_bars){state->coverage_min > 0 ? (1 - state->coverage_min / 100) / 2 : 1,
+                           fmax(state->measured.cover_dist, state->residual_max) / 100,
+                           state->residual_max / 100, npg_worker_facts(worker)->sensor_count_max > 0};
     NPG_TRY(npg_alloc(&late, NPG_FOR_RUN, sizeof *late));
     npg_status status = npg_verdict_finish(&state->verdict, late);
     for (size_t i = 0; i < late->count && !status; i++) {
@@ -390,7 +391,8 @@ static const npg_option options[] = {
         "% of them lie within twice that"),
     NPG_PART(REAL,          "bars.coverage",    AT(coverage_min),       "50",     0, 100,  "PERCENT",
         "least share of the surface that the keyframe saw and that is in sight, with points near it, in per "
-        "cent. A frame with clearly more of it without points than the best quarter of the frames is bad, too"),
+        "cent. A frame with clearly more of it without points than the best quarter of the frames is bad, too; "
+        "0: none is"),
     NPG_PART(REAL,          "bars.flipped",     AT(flipped_max),        "1",      0, 100,  "PERCENT",
         "most of its faces that are turned over, in per cent"),
     NPG_PART(REAL,          "bars.stretched",   AT(stretched_max),      "5",      0, 100,  "PERCENT",

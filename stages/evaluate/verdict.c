@@ -65,7 +65,7 @@ static npg_status judge_holes(double *bound, const npg_verdict *v)
     double *values;
     NPG_TRY(values_of_all(&values, v, offsetof(record, uncovered)));
     qsort(values, v->count, sizeof *values, npg_order_double);
-    *bound = NPG_CLEARLY * (values[v->count / 4] + NPG_FEW * 2 * v->bars.uncovered);
+    *bound = NPG_CLEARLY * (values[v->count / 4] + 2 * NPG_FEW * v->bars.uncovered);
     npg_release(&values);
     return NPG_OK;
 }
@@ -88,7 +88,8 @@ static npg_status judge_levels(npg_verdict *v, npg_level *dist)
     NPG_TRY(level_of_all(&torn, v, offsetof(record, torn), npg_misfit_floor(NPG_MISFIT_STRETCHED)));
     NPG_TRY(level_of_all(&bare, v, offsetof(record, bare), npg_misfit_floor(NPG_MISFIT_UNSUPPORTED)));
     NPG_TRY(judge_holes(&most, v));
-    if (v->bars.is_seen_from) most = open.usual + open.bound; /* a side that turns away is no hole */
+    /* A side that turns away is no hole. */
+    if (v->bars.is_seen_from || v->bars.uncovered >= 1) most = open.usual + open.bound;
     for (size_t i = 0; i < v->count; i++) {
         record *r = &v->records[i];
         find_fault(r, NPG_FAULT_UNCOVERED, r->uncovered, most);

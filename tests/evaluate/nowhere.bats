@@ -41,7 +41,7 @@ shares() { # OUT
 
 @test "a ball beside it in the reference: the frame is bad, and says why" {
     nodes=10 # too few for the ball to leave the place by itself
-    run_it ball --reference with_ball.obj --bars residual=100,invented=100,unsupported=100 || [ "$code" -eq 7 ]
+    run_it ball --reference with_ball.obj --bars residual=100,coverage=0,invented=100,unsupported=100 || [ "$code" -eq 7 ]
     [ "$code" -eq 7 ]
     shares ball | awk '{ print } NR == 1 && ($1 < 0.01 || $1 > 0.15) { exit 1 }'
     head -n 1 ball/frames.jsonl | grep -q '"fault":"nowhere"'

@@ -3,7 +3,7 @@
 load ../support/store
 
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
-    --keyframe 5 --bars residual=100,flipped=100,stretched=100,invented=100)
+    --keyframe 5 --bars residual=100,coverage=0,flipped=100,stretched=100,invented=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
@@ -13,9 +13,7 @@ setup_file() {
     "$NEUPIG-bodies" --body bar --frames 10 --points 1200 --cameras 2 --width 64 --cycles 0.5 -o parts >synth.log
     for capture in noisy noisy1 noisy2 parts; do
         for from in key all; do
-            # 7: so coarse a run loses the ends of the swing, and says so
-            "$NEUPIG" run $capture/points -o $capture-$from --method "{\"reference-from\": \"$from\"}" "${small[@]}" >$capture-$from.log 2>&1 ||
-                [ $? -eq 7 ]
+            "$NEUPIG" run $capture/points -o $capture-$from --method "{\"reference-from\": \"$from\"}" "${small[@]}" >$capture-$from.log 2>&1
         done
     done
 }

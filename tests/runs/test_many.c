@@ -81,6 +81,7 @@ static void run_capture(const temp_folder *folder, const char *output)
                                        {"align-steps", "2"},
                                        {"poisson-depth", "4"},
                                        {"bars.residual", "100"},
+                                       {"bars.coverage", "0"},
                                        {"bars.flipped", "100"}};
     npg_options *options = NULL;
     npg_run *run = NULL;
