@@ -210,19 +210,28 @@ typedef struct npg_neighbours {
 npg_status npg_neighbours_take(npg_neighbours *out, npg_arena *arena, const float *points, size_t point_count,
                                const float *queries, size_t query_count, size_t k);
 
+/* yes[i] = whether query i has a point of the tree no farther than its own radius, given squared; in the
+ * calling thread. */
+void npg_kdtree_any_within(const npg_kdtree *tree, uint8_t *yes, const float *queries, const float *radius_sq,
+                           size_t query_count);
+
 /* One point of the tree and its k nearest points, itself among them, as npg_kdtree_nearest() gives them; the
  * lists are valid until it returns. */
 typedef void npg_kdtree_visit(void *user, uint32_t point, const uint32_t *index, const float *dist_sq);
 
-/* Visit all points.  They come in the tree's order, from several threads at once: a visit may write only what
- * belongs to its point.  k <= NPG_KDTREE_NEIGHBOURS. */
-npg_status npg_kdtree_each(const npg_kdtree *tree, size_t k, npg_kdtree_visit *visit, void *user,
-                           int threads);
+/* Visit all points that are not left out; where `only` is not NULL, those alone whose entry in it is not 0.
+ * Points come in the tree's order, from several threads at once: a visit may write only what belongs to its
+ * point.  k <= NPG_KDTREE_NEIGHBOURS. */
+npg_status npg_kdtree_each(const npg_kdtree *tree, size_t k, const uint8_t *only, npg_kdtree_visit *visit,
+                           void *user, int threads);
 
 /* The tree's points in its order (N), in groups of at most NPG_KDTREE_GROUP that lie together, half of that at least where
  * there are several: first (N / (NPG_KDTREE_GROUP / 2) + 2) has where each begins, and N.  Returns how many there are. */
 #define NPG_KDTREE_GROUP 64 /* about the root of what winding sums go over: near and far cost alike */
 size_t npg_kdtree_groups(const npg_kdtree *tree, uint32_t *order, uint32_t *first);
+
+/* Leave out the points whose entry in keep (N) is 0: no later search finds them. */
+void npg_kdtree_leave_out(npg_kdtree *tree, const uint8_t *keep);
 
 /* Mesh tools: properties of a triangle mesh that several stages need.  V vertices, F faces, E edges. */
 

@@ -159,6 +159,17 @@ void npg_kdtree_close(npg_kdtree **slot)
     npg_object_close(slot);
 }
 
+void npg_kdtree_leave_out(npg_kdtree *tree, const uint8_t *keep)
+{
+    for (size_t l = 0; l <= tree->inner; l++)
+        for (size_t k = 0; k < LANES; k++) {
+            leaf *at = &tree->leaves[l];
+            if (at->index[k] == UINT32_MAX || keep[at->index[k]]) continue;
+            for (int a = 0; a < 3; a++) at->at[a][k] = INFINITY;
+            at->index[k] = UINT32_MAX;
+        }
+}
+
 size_t npg_kdtree_groups(const npg_kdtree *tree, uint32_t *order, uint32_t *first)
 {
     size_t groups = 0, count = 0;
@@ -325,6 +336,7 @@ INLINE void unpack(uint32_t *index, float *dist_sq, const nearest *n)
 typedef struct each {
     const npg_kdtree *tree;
     size_t k, parts;
+    const uint8_t *only;
     npg_kdtree_visit *visit;
     void *user;
 } each;
@@ -338,7 +350,7 @@ NPG_WIDE static void visit_leaves(const each *e, size_t first, size_t end)
     bool has_last = false;
     for (size_t i = first * LANES; i < end * LANES; i++) {
         uint32_t point = e->tree->leaves[i / LANES].index[i % LANES];
-        if (point == UINT32_MAX) continue;
+        if (point == UINT32_MAX || (e->only && !e->only[point])) continue;
         find_nearest(&n, e->tree, e->tree->points + 3 * (size_t)point, has_last);
         has_last = true;
         unpack(index, dist_sq, &n);
@@ -354,9 +366,10 @@ static npg_status visit_share(void *user, size_t part)
     return NPG_OK;
 }
 
-npg_status npg_kdtree_each(const npg_kdtree *tree, size_t k, npg_kdtree_visit *visit, void *user, int threads)
+npg_status npg_kdtree_each(const npg_kdtree *tree, size_t k, const uint8_t *only, npg_kdtree_visit *visit,
+                           void *user, int threads)
 {
-    each e = {.tree = tree, .k = k, .visit = visit, .user = user};
+    each e = {.tree = tree, .k = k, .only = only, .visit = visit, .user = user};
     NPG_REQUIRE(k >= 1 && k <= NPG_KDTREE_NEIGHBOURS && threads >= 0);
     e.parts = npg_parallel_parts(tree->count, QUERIES_MIN, (size_t)threads);
     return npg_parallel(visit_share, &e, e.parts);
@@ -406,7 +419,7 @@ npg_status npg_kdtree_nearest(const npg_kdtree *tree, uint32_t *index, float *di
         .tree = tree, .index = index, .dist_sq = dist_sq, .queries = queries, .count = query_count, .k = k};
     NPG_REQUIRE(k >= 1 && threads >= 0);
     if (queries == tree->points && query_count == tree->count && k <= NPG_KDTREE_NEIGHBOURS)
-        return npg_kdtree_each(tree, k, take_lists, &s, threads); /* in an order that is quicker */
+        return npg_kdtree_each(tree, k, NULL, take_lists, &s, threads); /* in an order that is quicker */
     s.parts = npg_parallel_parts(query_count, QUERIES_MIN, (size_t)threads);
     return npg_parallel(nearest_share, &s, s.parts);
 }
@@ -428,4 +441,19 @@ npg_status npg_neighbours_take(npg_neighbours *out, npg_arena *arena, const floa
     out->dist_sq = npg_arena_take(arena, query_count, k * sizeof *out->dist_sq);
     NPG_TRY(npg_arena_status(arena));
     return npg_points_nearest(out->index, out->dist_sq, points, point_count, queries, query_count, k);
+}
+
+NPG_WIDE void npg_kdtree_any_within(const npg_kdtree *tree, uint8_t *yes, const float *queries,
+                                    const float *radius_sq, size_t query_count)
+{
+    float dist_sq[LANES];
+    for (size_t i = 0; i < query_count; i++) {
+        const float *q = queries + 3 * i;
+        const leaf *l;
+        walk w;
+        yes[i] = 0;
+        begin_walk(&w, tree, q);
+        while (!yes[i] && (l = next_leaf(&w, tree, q, radius_sq[i])))
+            yes[i] = near_lanes(dist_sq, l, q, radius_sq[i]) != 0;
+    }
 }

@@ -62,7 +62,7 @@ npg_status npg_normals_estimate(float *normals, const float *points, size_t n, i
     estimate e = {.normals = normals, .neighbours = (size_t)neighbours, .points = points};
     NPG_REQUIRE(neighbours >= 3 && neighbours <= NPG_KDTREE_NEIGHBOURS);
     NPG_TRY(npg_kdtree_open(&tree, points, n));
-    npg_status status = npg_kdtree_each(tree, (size_t)neighbours, estimate_point, &e, 0);
+    npg_status status = npg_kdtree_each(tree, (size_t)neighbours, NULL, estimate_point, &e, 0);
     npg_kdtree_close(&tree);
     return status;
 }

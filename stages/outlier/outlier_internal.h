@@ -42,10 +42,12 @@ npg_status npg_clean_check(const npg_frame *frame);
  * Levina, P. J. Bickel, Maximum Likelihood Estimation of Intrinsic Dimension, NIPS 2004. */
 
 /* keep[i] = 0 for the isolated ones of points (N x 3, finite, N > 0), else 1: those whose mean distance to
- * their `neighbours` nearest points is more than `ratio` standard deviations above the mean of all points, and of
- * what is left, until there are none.  Points clearly farther apart than most, which are no surface but scattered
- * in space, count for neither: a tenth of the points would be enough to hide each other.  Where such go, distances
- * are taken again among those left.  Uses `threads` threads (0: one per core); the result does not depend on it.
+ * their `neighbours` nearest points is more than `ratio` standard deviations above the mean of all points.  Points
+ * clearly farther apart than most, which are no surface but scattered in space, count for neither: a tenth of
+ * the points would be enough to hide each other.
+ * This is asked again of what is left until there are no more (NPG_ROUNDS_MOST at most): far outliers raise mean
+ * and deviation and so hide the near ones from the first round.  A round searches only where the one before
+ * took a neighbour away.  Uses `threads` threads (0: one per core); the result does not depend on it.
  * NPG_MEMORY. */
 npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t point_count, int neighbours,
                              double ratio, int threads);

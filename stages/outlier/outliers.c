@@ -12,16 +12,40 @@
 #include "pipeline/order.h"
 #include "pipeline/parallel.h"
 
-#define ROUNDS 8 /* of searches, each in what the one before has left; set by trial */
+#define ROUNDS    8   /* of the filter, each on what the one before has left; set by trial */
+#define DIMENSION 2.5 /* of points: a surface's is 2, of what is scattered in space 3 */
 
 typedef struct filter {
-    npg_arena arena;
-    size_t count, neighbours;
-    float *mean;   /* N: of the distances to the neighbours    */
-    float *spread; /* N: 1 / the dimension of the points around */
-    float *sorted; /* N */
-    uint8_t *keep; /* N, a loan */
+    const float *points;
+    size_t count, left, neighbours;
+    npg_kdtree *tree;
+    float *mean, *far_sq; /* N each, owned: of the distances to the neighbours; to the last of them */
+    float *spread;        /* N, owned: 1 / the dimension of the points around */
+    float *sorted;        /* N, owned: of those that are left, the mean */
+    uint8_t *is_asked;    /* N, owned: a neighbour of the point is gone */
+    uint8_t *keep;        /* N, a loan */
+    int threads;
 } filter;
+
+static npg_status open_filter(filter *f)
+{
+    NPG_TRY(npg_alloc_array(&f->mean, NPG_FOR_FRAMES, f->count, sizeof *f->mean));
+    NPG_TRY(npg_alloc_array(&f->far_sq, NPG_FOR_FRAMES, f->count, sizeof *f->far_sq));
+    NPG_TRY(npg_alloc_array(&f->spread, NPG_FOR_FRAMES, f->count, sizeof *f->spread));
+    NPG_TRY(npg_alloc_array(&f->sorted, NPG_FOR_FRAMES, f->count, sizeof *f->sorted));
+    NPG_TRY(npg_alloc(&f->is_asked, NPG_FOR_FRAMES, f->count));
+    return npg_kdtree_open(&f->tree, f->points, f->count);
+}
+
+static void close_filter(filter *f)
+{
+    npg_kdtree_close(&f->tree);
+    npg_release(&f->mean);
+    npg_release(&f->far_sq);
+    npg_release(&f->spread);
+    npg_release(&f->sorted);
+    npg_release(&f->is_asked);
+}
 
 /* An npg_kdtree_visit: the point itself is the first of its neighbours.  Around a point of a set of dimension d the
  * number of others grows with the distance to the power of d; of K neighbours
@@ -37,6 +61,7 @@ static void measure(void *user, uint32_t point, const uint32_t *index, const flo
         farther *= (double)dist_sq[f->neighbours] / (double)dist_sq[k];
     }
     f->mean[point] = (float)(sum / (double)f->neighbours);
+    f->far_sq[point] = dist_sq[f->neighbours];
     f->spread[point] = (float)(log(farther) / 2 / fmax(1, (double)f->neighbours - 2));
 }
 
@@ -46,21 +71,23 @@ static double scattered_from(const filter *f)
 {
     double spread = 0;
     size_t count = 0;
-    memcpy(f->sorted, f->mean, f->count * sizeof *f->sorted);
-    qsort(f->sorted, f->count, sizeof *f->sorted, npg_order_float);
-    double far = NPG_CLEARLY * (double)f->sorted[f->count / 2];
+    for (size_t i = 0; i < f->count; i++)
+        if (f->keep[i]) f->sorted[count++] = f->mean[i];
+    qsort(f->sorted, count, sizeof *f->sorted, npg_order_float);
+    double far = NPG_CLEARLY * (double)f->sorted[count / 2];
+    count = 0;
     for (size_t i = 0; i < f->count; i++) {
-        if (!((double)f->mean[i] > far)) continue;
+        if (!f->keep[i] || !((double)f->mean[i] > far)) continue;
         spread += (double)f->spread[i];
         count++;
     }
-    return (2 + 3) * spread < 2 * (double)count ? far : (double)INFINITY; /* nearer to space's 3 than to 2 */
+    return DIMENSION * spread < (double)count ? far : (double)INFINITY;
 }
 
-/* The mean distance above which a point is isolated: of points no farther apart than `far`. */
-static double threshold_of(const filter *f, double far, double ratio)
+/* The mean distance above which a point is isolated. */
+static double threshold_of(const filter *f, double ratio)
 {
-    double sum = 0, sum_sq = 0, n = 0;
+    double sum = 0, sum_sq = 0, n = 0, far = scattered_from(f);
     for (size_t i = 0; i < f->count; i++) {
         if (!f->keep[i] || (double)f->mean[i] > far) continue;
         sum += (double)f->mean[i];
@@ -71,71 +98,63 @@ static double threshold_of(const filter *f, double far, double ratio)
     return sum / n + ratio * sqrt(variance > 0 ? variance : 0);
 }
 
-/* Take the points above the threshold away; returns how many. */
-static size_t drop(filter *f, double threshold)
-{
-    size_t dropped = 0;
-    for (size_t i = 0; i < f->count; i++) {
-        bool drops = f->keep[i] && (double)f->mean[i] > threshold;
-        if (drops) f->keep[i] = 0;
-        dropped += drops;
-    }
-    return dropped;
-}
-
-/* *again: scattered points were among the neighbours of others. */
-static npg_status search(filter *f, bool *again, const float *points, double ratio, int threads)
+/* Ask again for the points that had one of those `gone` (G x 3) among their neighbours. */
+static npg_status ask_again(filter *f, const float *gone, size_t gone_count)
 {
     npg_kdtree *tree;
-    f->mean = npg_arena_take(&f->arena, f->count, sizeof *f->mean);
-    f->spread = npg_arena_take(&f->arena, f->count, sizeof *f->spread);
-    f->sorted = npg_arena_take(&f->arena, f->count, sizeof *f->sorted);
-    NPG_TRY(npg_arena_status(&f->arena));
-    NPG_TRY(npg_kdtree_open(&tree, points, f->count));
-    npg_status status = npg_kdtree_each(tree, f->neighbours + 1, measure, f, threads);
+    NPG_TRY(npg_kdtree_open(&tree, gone, gone_count));
+    npg_kdtree_any_within(tree, f->is_asked, f->points, f->far_sq, f->count);
     npg_kdtree_close(&tree);
-    NPG_TRY(status);
-    double far = scattered_from(f);
-    size_t left = f->count;
-    for (size_t dropped = 1; dropped; left -= dropped) dropped = drop(f, threshold_of(f, far, ratio));
-    *again = isfinite(far) && left < f->count;
     return NPG_OK;
 }
 
-/* One search in the points that are left; in their places. */
-static npg_status search_left(uint8_t *keep, bool *again, const float *points, size_t count,
-                              size_t neighbours, double ratio, int threads)
+/* Take the points above the threshold away; *dropped counts them. */
+static npg_status drop(filter *f, size_t *dropped, double threshold)
 {
-    filter f = {.arena.purpose = NPG_FOR_FRAMES, .neighbours = neighbours};
-    float *left = npg_arena_take(&f.arena, count, 3 * sizeof *left);
-    f.keep = npg_arena_take(&f.arena, count, 1);
-    npg_status status = npg_arena_status(&f.arena);
-    for (size_t i = 0; i < count && !status; i++)
-        if (keep[i]) memcpy(left + 3 * f.count++, points + 3 * i, 3 * sizeof *left);
-    if (!status) memset(f.keep, 1, f.count);
-    *again = false;
-    if (!status && f.count > neighbours) status = search(&f, again, left, ratio, threads);
-    for (size_t i = 0, k = 0; i < count && !status; i++)
-        if (keep[i]) keep[i] = f.keep[k++];
-    npg_arena_release(&f.arena);
+    float *gone;
+    size_t count = 0;
+    for (size_t i = 0; i < f->count; i++) count += f->keep[i] && (double)f->mean[i] > threshold;
+    *dropped = count;
+    if (!count) return NPG_OK;
+    NPG_TRY(npg_alloc_array(&gone, NPG_FOR_FRAMES, count, 3 * sizeof *gone));
+    count = 0;
+    for (size_t i = 0; i < f->count; i++) {
+        if (!f->keep[i] || !((double)f->mean[i] > threshold)) continue;
+        f->keep[i] = 0;
+        memcpy(gone + 3 * count++, f->points + 3 * i, 3 * sizeof *gone);
+    }
+    f->left -= count;
+    npg_kdtree_leave_out(f->tree, f->keep);
+    npg_status status = ask_again(f, gone, count);
+    npg_release(&gone);
     return status;
 }
 
 npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, int neighbours, double ratio,
                              int threads)
 {
-    npg_status status = NPG_OK;
-    bool again = true;
+    filter f = {.points = points,
+                .count = count,
+                .left = count,
+                .neighbours = (size_t)neighbours,
+                .keep = keep,
+                .threads = threads};
+    size_t dropped = 1;
     NPG_REQUIRE(neighbours >= 1 && neighbours < NPG_KDTREE_NEIGHBOURS && ratio >= 0);
     memset(keep, 1, count);
-    for (int round = 0; round < ROUNDS && again && !status; round++)
-        status = search_left(keep, &again, points, count, (size_t)neighbours, ratio, threads);
+    if (count <= f.neighbours) return NPG_OK;
+    npg_status status = open_filter(&f);
+    for (int round = 0; round < ROUNDS && dropped && f.left > f.neighbours && !status; round++) {
+        status = npg_kdtree_each(f.tree, f.neighbours + 1, round ? f.is_asked : NULL, measure, &f, threads);
+        if (!status) status = drop(&f, &dropped, threshold_of(&f, ratio));
+    }
+    close_filter(&f);
     return status;
 }
 
 size_t npg_find_isolated_memory(size_t count)
 {
-    return npg_kdtree_memory(count) + count * (6 * sizeof(float) + 1);
+    return npg_kdtree_memory(count) + count * (4 * sizeof(float) + 1 + 3 * sizeof(float));
 }
 
 /* ---- several frames ---- */

@@ -37,20 +37,23 @@ static float dist(const float *p, const float *q)
 }
 
 /* The list of one query is what sorting all points by distance and index would give. */
-static void expect_list(const float *q, const uint32_t *index, const float *sq, size_t count, size_t k)
+static void expect_list(const float *q, const uint32_t *index, const float *sq, size_t count, size_t k,
+                        const uint8_t *keep)
 {
+    size_t there = 0;
+    for (size_t i = 0; i < count; i++) there += !keep || keep[i];
     for (size_t j = 0; j < k; j++) {
         size_t before = 0;
-        if (j >= count) {
+        if (j >= there) {
             assert_int_equal(index[j], UINT32_MAX);
             assert_true(isinf(sq[j]));
             continue;
         }
-        assert_true(index[j] < count);
+        assert_true(index[j] < count && (!keep || keep[index[j]]));
         assert_true(dist(q, points + 3 * (size_t)index[j]) == sq[j]);
         for (size_t i = 0; i < count; i++) {
             float d = dist(q, points + 3 * i);
-            before += d < sq[j] || (d == sq[j] && i < index[j]);
+            before += (!keep || keep[i]) && (d < sq[j] || (d == sq[j] && i < index[j]));
         }
         assert_int_equal(before, j);
     }
@@ -71,15 +74,16 @@ static void nearest_are_those_of_looking_at_all(void **state)
             assert_int_equal(npg_kdtree_open(&tree, points, count), NPG_OK);
             assert_int_equal(npg_kdtree_nearest(tree, index_of, dist_sq, queries, 200, ks[k], 2), NPG_OK);
             for (size_t i = 0; i < 200; i += 7)
-                expect_list(queries + 3 * i, index_of + ks[k] * i, dist_sq + ks[k] * i, count, ks[k]);
+                expect_list(queries + 3 * i, index_of + ks[k] * i, dist_sq + ks[k] * i, count, ks[k], NULL);
             assert_int_equal(npg_kdtree_nearest(tree, index_of, dist_sq, points, count, ks[k], 2), NPG_OK);
             for (size_t i = 0; i < count; i += 1 + count / 60)
-                expect_list(points + 3 * i, index_of + ks[k] * i, dist_sq + ks[k] * i, count, ks[k]);
+                expect_list(points + 3 * i, index_of + ks[k] * i, dist_sq + ks[k] * i, count, ks[k], NULL);
             npg_kdtree_close(&tree);
         }
 }
 
 typedef struct seen {
+    const uint8_t *keep;
     size_t count, k;
     uint8_t is_visited[MOST];
 } seen;
@@ -88,19 +92,42 @@ static void visit(void *user, uint32_t point, const uint32_t *index, const float
 {
     seen *s = user;
     s->is_visited[point]++;
-    if (point % 83 == 0) expect_list(points + 3 * (size_t)point, index, sq, s->count, s->k);
+    if (point % 83 == 0) expect_list(points + 3 * (size_t)point, index, sq, s->count, s->k, s->keep);
 }
 
-static void each_point_is_visited_once(void **state)
+static void what_is_left_out_is_not_found(void **state)
 {
     (void)state;
     static seen s;
+    static uint8_t keep[MOST], only[MOST];
     npg_kdtree *tree;
     make_points(MOST, 1);
-    s = (seen){.count = MOST, .k = 13};
+    s = (seen){.keep = keep, .count = MOST, .k = 13};
+    for (size_t i = 0; i < MOST; i++) keep[i] = i % 11 != 0;
+    for (size_t i = 0; i < MOST; i++) only[i] = i % 2 == 0;
     assert_int_equal(npg_kdtree_open(&tree, points, MOST), NPG_OK);
-    assert_int_equal(npg_kdtree_each(tree, s.k, visit, &s, 1), NPG_OK);
-    for (size_t i = 0; i < MOST; i++) assert_int_equal(s.is_visited[i], 1);
+    npg_kdtree_leave_out(tree, keep);
+    assert_int_equal(npg_kdtree_each(tree, s.k, only, visit, &s, 1), NPG_OK);
+    for (size_t i = 0; i < MOST; i++) assert_int_equal(s.is_visited[i], keep[i] && only[i]);
+    npg_kdtree_close(&tree);
+}
+
+static void within_a_radius_is_what_looking_at_all_says(void **state)
+{
+    (void)state;
+    npg_kdtree *tree;
+    uint8_t yes[200];
+    float radius_sq[200];
+    make_points(MOST, 1);
+    for (size_t i = 0; i < 3 * 200; i++) queries[i] = 0.01f * (float)((i * 37) % 300) - 1;
+    for (size_t i = 0; i < 200; i++) radius_sq[i] = 1e-4f * (float)(i * i % 700);
+    assert_int_equal(npg_kdtree_open(&tree, points, MOST), NPG_OK);
+    npg_kdtree_any_within(tree, yes, queries, radius_sq, 200);
+    for (size_t q = 0; q < 200; q++) {
+        uint32_t within = 0;
+        for (size_t i = 0; i < MOST; i++) within += dist(queries + 3 * q, points + 3 * i) <= radius_sq[q];
+        assert_int_equal(yes[q], within > 0);
+    }
     npg_kdtree_close(&tree);
 }
 
@@ -155,8 +182,10 @@ static void memory_runs_out_without_harm(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nearest_are_those_of_looking_at_all), cmocka_unit_test(each_point_is_visited_once),
-        cmocka_unit_test(groups_lie_together), cmocka_unit_test(memory_runs_out_without_harm)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(nearest_are_those_of_looking_at_all),
+                                       cmocka_unit_test(what_is_left_out_is_not_found),
+                                       cmocka_unit_test(within_a_radius_is_what_looking_at_all_says),
+                                       cmocka_unit_test(groups_lie_together),
+                                       cmocka_unit_test(memory_runs_out_without_harm)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
