@@ -12,8 +12,7 @@
 #include "pipeline/order.h"
 #include "pipeline/parallel.h"
 
-#define ROUNDS    8   /* of the filter, each on what the one before has left; set by trial */
-#define DIMENSION 2.5 /* of points: a surface's is 2, of what is scattered in space 3 */
+#define ROUNDS 8 /* of the filter, each on what the one before has left; set by trial */
 
 typedef struct filter {
     const float *points;
@@ -81,7 +80,7 @@ static double scattered_from(const filter *f)
         spread += (double)f->spread[i];
         count++;
     }
-    return DIMENSION * spread < (double)count ? far : (double)INFINITY;
+    return (2 + 3) * spread < 2 * (double)count ? far : (double)INFINITY; /* nearer to space's 3 than to 2 */
 }
 
 /* The mean distance above which a point is isolated. */
