@@ -59,13 +59,15 @@ static npg_status level_of_all(npg_level *level, const npg_verdict *v, size_t of
 }
 
 /* The share without points that a frame may have.  Half of the frames may be wrong, but hardly three of four; holes in
- * the points differ less than that. */
-static npg_status judge_holes(double *bound, const npg_verdict *v)
+ * the points differ less than that, but a side that turns away from its sensors is no hole. */
+static npg_status judge_holes(double *most, const npg_verdict *v)
 {
-    double *values;
+    double *values, floor = v->bars.uncovered;
     NPG_TRY(values_of_all(&values, v, offsetof(record, uncovered)));
     qsort(values, v->count, sizeof *values, npg_order_double);
-    *bound = NPG_CLEARLY * (values[v->count / 4] + 2 * NPG_FEW * v->bars.uncovered);
+    double best = NPG_CLEARLY * (values[v->count / 4] + 2 * NPG_FEW * floor);
+    npg_level level = npg_level_of(values, v->count, floor);
+    *most = v->bars.is_seen_from || floor >= 1 ? level.usual + level.bound : best;
     npg_release(&values);
     return NPG_OK;
 }
@@ -81,15 +83,12 @@ static void find_fault(record *r, int fault, double value, double bound)
 
 static npg_status judge_levels(npg_verdict *v, npg_level *dist)
 {
-    npg_level open, torn, bare;
+    npg_level torn, bare;
     double most;
-    NPG_TRY(level_of_all(&open, v, offsetof(record, uncovered), v->bars.uncovered));
+    NPG_TRY(judge_holes(&most, v));
     NPG_TRY(level_of_all(dist, v, offsetof(record, vertex_dist), v->bars.vertex_dist));
     NPG_TRY(level_of_all(&torn, v, offsetof(record, torn), npg_misfit_floor(NPG_MISFIT_STRETCHED)));
     NPG_TRY(level_of_all(&bare, v, offsetof(record, bare), npg_misfit_floor(NPG_MISFIT_UNSUPPORTED)));
-    NPG_TRY(judge_holes(&most, v));
-    /* A side that turns away is no hole. */
-    if (v->bars.is_seen_from || v->bars.uncovered >= 1) most = open.usual + open.bound;
     for (size_t i = 0; i < v->count; i++) {
         record *r = &v->records[i];
         find_fault(r, NPG_FAULT_UNCOVERED, r->uncovered, most);

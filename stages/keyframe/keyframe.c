@@ -406,6 +406,7 @@ static npg_status settle(npg_worker *worker)
     if (facts->brief.compares)
         npg_candidates_list(npg_own(worker, choice), facts->plan.key, facts->planned_count,
                             npg_worker_kept(worker), false);
+    /* Before the first fusing pass the brief may be all zeros, unless it asks for another try. */
     if (npg_worker_pass(worker) != NPG_PASS_FUSE && !facts->brief.is_attempt) return NPG_OK;
     if (key < 0 || key == facts->plan.key) return NPG_OK;
     int64_t number = clouds->list[npg_candidate_clouds_find(clouds, key)].number;
