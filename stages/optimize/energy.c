@@ -145,7 +145,8 @@ static double median_spread(npg_energy *e, size_t count)
     return e->scores[seen / 2];
 }
 
-/* What each frame's pose is worth: little where its surface is much farther from its points than usual. */
+/* What each frame says: little where its surface is much farther from its points than usual.  Either its pose is
+ * wrong, or the points are. */
 static npg_status weigh_frames(npg_energy *e, size_t count)
 {
     frame_work r = {e, count};
@@ -176,6 +177,7 @@ static npg_status match_frames(void *user, size_t part)
         double width = NPG_BEYOND * fmax(fmax(e->spreads[t], e->noise), NOISE_LEAST);
         NPG_TRY(npg_point_matcher_match(&e->matchers[part], pulls, &e->system.pull_counts[t], &e->frames[t],
                                         width));
+        for (size_t i = 0; i < e->system.pull_counts[t]; i++) pulls[i].strength *= e->system.shares[t];
     }
     return NPG_OK;
 }

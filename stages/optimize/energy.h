@@ -7,7 +7,7 @@
 
 /* Energy: what a window of aligned frames is moved by: the points of all of them at once.
  *
- *     E = sum_t sum_p w_p (n_p . (x(c_p) - p))^2                                 points
+ *     E = sum_t share_t sum_p w_p (n_p . (x(c_p) - p))^2                         points
  *       + c sum_v sum_t lambda_v |x_(t-1) - 2 x_t + x_(t+1)|^2                   motion
  *       + sum_v sum_t tie_v share_t |x_t - y_t|^2                                poses
  *       + shape sum_t sum_(i,j) |(x_i - s_i) - (x_j - s_j)|^2                    shape
@@ -20,8 +20,8 @@
  *
  * e: the points per vertex.  Where frames agree with each other already (small lambda), their poses are
  * believed; where each is off by its own noise, or has few points, the points of all frames decide, and the
- * motion is even.  share_t: small where the frame's pose is far from its points, 0 without points: its
- * neighbours in time carry it.
+ * motion is even.  share_t: small where the frame's surface is far from its points, 0 without points: its
+ * neighbours in time carry it, and are not drawn to points that are of something else.
  *
  * The points are matched once, where the surfaces are in the smoothed poses; then E is quadratic in the way
  * d = x - s from there: E = E(s) + d^T A d - 2 r^T d.  Not in the paper: tests/bed/decisions.md compares. */

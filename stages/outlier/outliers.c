@@ -75,11 +75,8 @@ static double scattered_from(const filter *f)
     qsort(f->sorted, count, sizeof *f->sorted, npg_order_float);
     double far = NPG_CLEARLY * (double)f->sorted[count / 2];
     count = 0;
-    for (size_t i = 0; i < f->count; i++) {
-        if (!f->keep[i] || !((double)f->mean[i] > far)) continue;
-        spread += (double)f->spread[i];
-        count++;
-    }
+    for (size_t i = 0; i < f->count; i++)
+        if (f->keep[i] && (double)f->mean[i] > far) spread += (double)f->spread[i], count++;
     return (2 + 3) * spread < 2 * (double)count ? far : (double)INFINITY; /* nearer to space's 3 than to 2 */
 }
 

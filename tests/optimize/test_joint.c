@@ -139,6 +139,26 @@ static void neighbours_carry_what_is_not_seen(void **state)
     npg_mesh_unref(&c.ball);
 }
 
+/* One frame has points of something else: it draws neither its neighbours nor itself to them. */
+static void points_that_fit_nothing_pull_nothing(void **state)
+{
+    static capture c;
+    npg_energy_frame frames[FRAMES];
+    npg_random random = npg_random_stream(7, 0, 0);
+    (void)state;
+    make_capture(&c, 0.001f, 0.001f);
+    fill_frames(frames, &c);
+    for (int i = 0; i < 3 * VERTS; i++) {
+        c.points[6][i] = c.truth[6][i % 3] + (float)(2.4 * npg_random_real(&random) - 1.2);
+        c.pose[6][i] *= 0.8f;
+    }
+    solve(&c, frames);
+    print_message("that frame: %.4f, beside it %.4f and %.4f\n", error_of(&c, 6, 6), error_of(&c, 5, 5),
+                  error_of(&c, 7, 7));
+    assert_true(error_of(&c, 6, 6) < 0.02 && error_of(&c, 5, 5) < 0.005 && error_of(&c, 7, 7) < 0.005);
+    npg_mesh_unref(&c.ball);
+}
+
 /* Where one frame has a hole, and its pose clings to what it has points of, the frames around it say where the
  * surface is; what the frame saw stays. */
 static void holes_are_bridged(void **state)
@@ -240,6 +260,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(band_solves),
                                        cmocka_unit_test(smoothing_follows_the_noise),
                                        cmocka_unit_test(neighbours_carry_what_is_not_seen),
+                                       cmocka_unit_test(points_that_fit_nothing_pull_nothing),
                                        cmocka_unit_test(holes_are_bridged),
                                        cmocka_unit_test(even_is_of_poses_and_motion),
                                        cmocka_unit_test(equal_input_gives_equal_bits),
