@@ -154,7 +154,7 @@ static npg_status weigh_frames(npg_energy *e, size_t count)
     double usual = median_spread(e, count);
     for (size_t t = 0; t < count; t++) {
         double over = usual > 0 ? e->spreads[t] / usual : 1, off = fmax(0, over - 1);
-        e->system.shares[t] = e->frames[t].point_count ? (float)(1 / (1 + off * off)) : 0;
+        e->system.shares[t] = e->frames[t].point_count ? (float)npg_geman_mcclure(off * off, 1) : 0;
     }
     return NPG_OK;
 }
