@@ -94,19 +94,11 @@ static double threshold_of(const filter *f, double ratio)
     return sum / n + ratio * sqrt(variance > 0 ? variance : 0);
 }
 
-/* Ask again for the points that had one of those `gone` (G x 3) among their neighbours. */
-static npg_status ask_again(filter *f, const float *gone, size_t gone_count)
-{
-    npg_kdtree *tree;
-    NPG_TRY(npg_kdtree_open(&tree, gone, gone_count));
-    npg_kdtree_any_within(tree, f->is_asked, f->points, f->far_sq, f->count);
-    npg_kdtree_close(&tree);
-    return NPG_OK;
-}
-
-/* Take the points above the threshold away; *dropped counts them. */
+/* Take the points above the threshold away (*dropped counts them), and ask again for those that had one of them among
+ * their neighbours. */
 static npg_status drop(filter *f, size_t *dropped, double threshold)
 {
+    npg_kdtree *tree;
     float *gone;
     size_t count = 0;
     for (size_t i = 0; i < f->count; i++) count += f->keep[i] && (double)f->mean[i] > threshold;
@@ -121,7 +113,9 @@ static npg_status drop(filter *f, size_t *dropped, double threshold)
     }
     f->left -= count;
     npg_kdtree_leave_out(f->tree, f->keep);
-    npg_status status = ask_again(f, gone, count);
+    npg_status status = npg_kdtree_open(&tree, gone, count);
+    if (!status) npg_kdtree_any_within(tree, f->is_asked, f->points, f->far_sq, f->count);
+    npg_kdtree_close(&tree);
     npg_release(&gone);
     return status;
 }
