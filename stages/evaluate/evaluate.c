@@ -229,9 +229,9 @@ static json_t *json_of_sums(const evaluate_state *state)
  * of lies near. */
 static void report_verdict(json_t *report, const evaluate_state *state, double unseen)
 {
-    const aggregate *median = &state->sums[NPG_FIGURE_MEDIAN], *p95 = &state->sums[NPG_FIGURE_P95];
+    const aggregate *p95 = &state->sums[NPG_FIGURE_P95];
     size_t frames = state->good_count + state->bad_count + state->skipped_count;
-    double percent = median->count ? 100 * median->sum / (double)median->count : (double)NAN;
+    double percent = state->verdict.count ? 100 * state->verdict.fit : (double)NAN;
     int64_t worst = state->bad_count ? state->worst_number : p95->worst_number;
     char why[256], middle[128] = "", text[512];
     int length = 0;
@@ -243,7 +243,7 @@ static void report_verdict(json_t *report, const evaluate_state *state, double u
     json_t *quality =
         json_pack("{sI sI so sf}", "good", (json_int_t)state->good_count, "frames", (json_int_t)frames,
                   "median_percent", npg_json_real(percent), "unseen_percent", 100 * unseen);
-    if (median->count) length = snprintf(middle, sizeof middle, ", median %.2g %%", percent);
+    if (state->verdict.count) length = snprintf(middle, sizeof middle, ", median %.2g %%", percent);
     if (unseen > NPG_FEW)
         snprintf(middle + length, sizeof middle - (size_t)length, ", %.2g %% of the surface without points",
                  100 * unseen);

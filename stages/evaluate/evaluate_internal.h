@@ -198,7 +198,7 @@ double npg_misfit_floor(int kind);
  *              around: a cut, a mirrored frame, another body.  Up to three odd frames after which it is where
  *              it was before are the ones at fault; else the frame behind the jump, as seen from the keyframe.
  *
- * Four frames are the least that say what is usual.  Memory: 160 bytes a frame. */
+ * Four frames are the least that say what is usual.  Memory: 168 bytes a frame. */
 
 typedef struct npg_verdict_bars {
     double uncovered;   /* share of the surface, the least that counts; 1: nothing does */
@@ -212,6 +212,7 @@ typedef struct npg_verdict {
     int64_t key;
     struct npg_verdict_record *records; /* NULL at first; owned */
     size_t count, room;
+    double fit; /* once finished: median over the frames of their points' median distance, in diagonals */
 } npg_verdict;
 
 /* A frame with its figures, in any order; one that was not measured, or is another segment's, is passed

@@ -14,7 +14,7 @@ enum { AROUND = NPG_ALARM_FRAMES }; /* motions on either side that tell what is 
 
 typedef struct npg_verdict_record {
     int64_t index, number;
-    double uncovered, vertex_dist, torn, bare; /* the last two: of the largest place, of the area */
+    double fit, uncovered, vertex_dist, torn, bare; /* the last two: of the largest place, of the area */
     float marks[3 * NPG_MARKS];
     int fault; /* NPG_FAULT_*: what the frame's own bars have found, then what is found here */
     bool is_late;
@@ -30,7 +30,8 @@ npg_status npg_verdict_add(npg_verdict *verdict, const npg_frame *frame)
     record *r = &verdict->records[verdict->count++];
     *r = (record){.index = frame->index,
                   .number = frame->number,
-                  .uncovered = (double)(float)(1 - f->coverage), /* as a resumed run reads it back */
+                  .fit = (double)(float)f->point_dist_median, /* as a resumed run reads it back */
+                  .uncovered = (double)(float)(1 - f->coverage),
                   .vertex_dist = (double)(float)f->vertex_dist_mean,
                   .torn = (double)(float)f->misfits[NPG_MISFIT_STRETCHED].share,
                   .bare = (double)(float)f->misfits[NPG_MISFIT_UNSUPPORTED].share,
@@ -179,8 +180,10 @@ static npg_status list_faults(const npg_verdict *v, npg_late_faults *late)
 
 npg_status npg_verdict_finish(npg_verdict *v, npg_late_faults *late)
 {
-    npg_level dist;
+    npg_level fit, dist;
     *late = (npg_late_faults){0};
+    NPG_TRY(level_of_all(&fit, v, offsetof(record, fit), 0));
+    v->fit = fit.usual;
     if (v->count <= NPG_ALARM_FRAMES) return NPG_OK; /* too few to say what is usual */
     qsort(v->records, v->count, sizeof *v->records, by_index);
     NPG_TRY(judge_levels(v, &dist));

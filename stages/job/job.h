@@ -142,7 +142,7 @@ typedef struct npg_figure_row {
     size_t offset; /* of a double in npg_figures */
     bool is_small_bad;
 } npg_figure_row;
-enum { NPG_FIGURE_ROWS = 12, NPG_FIGURE_MEDIAN = 0, NPG_FIGURE_P95 = 2 };
+enum { NPG_FIGURE_ROWS = 12, NPG_FIGURE_P95 = 2 };
 extern const npg_figure_row npg_figure_rows[NPG_FIGURE_ROWS];
 static inline double *npg_figure_at(npg_figures *figures, int row)
 {
