@@ -24,7 +24,8 @@ fuzz_seconds=${1:-5}
 # shellcheck disable=SC2086
 install_packages $packages_to_build $packages_to_test
 
-CTEST_PARALLEL_LEVEL=$(nproc)
+cores=$(nproc)
+CTEST_PARALLEL_LEVEL=$((cores + (cores + 1) / 2)) # many tests wait: for files that grow, signals, disks
 export CTEST_PARALLEL_LEVEL
 
 times="" title="" began=$SECONDS
@@ -55,7 +56,7 @@ last_tests() # CTEST'S ARGUMENTS...
 
 part "Format"
 find pipeline stages kernels tools tests samples \( -name '*.[ch]' -o -name '*.cpp' -o -name '*.hpp' \) -print0 |
-    xargs -0 -n 32 -P "$CTEST_PARALLEL_LEVEL" clang-format-14 --dry-run -Werror --ferror-limit=1
+    xargs -0 -n 32 -P "$cores" clang-format-14 --dry-run -Werror --ferror-limit=1
 
 build release
 if [ $is_fast = yes ]; then
