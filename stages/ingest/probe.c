@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "geometry/limits.h"
 #include "pipeline/clock.h"
 #include "pipeline/cost.h"
 #include "pipeline/order.h"
@@ -26,7 +27,6 @@ void npg_probe_warn(npg_probe *probe, const char *format, ...)
 /* ---- frames ---- */
 
 /* When a frame is worth a warning; set by trial. */
-#define USABLE_LEAST  4    /* points: no closed surface has fewer                   */
 #define JUMP_MOST     0.25 /* of the box's middle from frame to frame, in diagonals */
 #define GROWTH_MOST   1.5  /* of the box's diagonal from frame to frame, up or down */
 #define COUNTS_DIFFER 10   /* times between the least and the most points of a frame */
@@ -59,11 +59,12 @@ static bool is_empty(const npg_bounds *bounds)
 static void warn_of_frame(npg_probe *probe, const cloud_facts *facts, const npg_frame *frame, int64_t number)
 {
     size_t usable = frame->point_count - facts->not_finite;
-    if (usable < USABLE_LEAST)
-        npg_probe_warn(probe, "frame %lld has only %zu usable points", (long long)number, usable);
+    if (usable < NPG_PATCH)
+        npg_probe_warn(probe, "frame %lld has only %zu usable points, fewer than %d: --keep-going skips it",
+                       (long long)number, usable, NPG_PATCH);
     if (is_empty(&facts->bounds)) return;
     double size = npg_bounds_diagonal(&facts->bounds);
-    if (usable >= USABLE_LEAST && !(size > 0))
+    if (usable >= NPG_PATCH && !(size > 0))
         npg_probe_warn(probe, "frame %lld: all points are equal", (long long)number);
     if (!is_empty(&probe->last)) {
         double before = npg_bounds_diagonal(&probe->last), moved_sq = 0;

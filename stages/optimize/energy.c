@@ -145,8 +145,7 @@ static double median_spread(npg_energy *e, size_t count)
     return e->scores[seen / 2];
 }
 
-/* What each frame says: little where its surface is much farther from its points than usual.  Either its pose is
- * wrong, or the points are. */
+/* What each frame says: little where its surface is much farther from its points than usual: one is wrong. */
 static npg_status weigh_frames(npg_energy *e, size_t count)
 {
     frame_work r = {e, count};

@@ -52,9 +52,22 @@ setup() {
     [[ "$output" == *"frame 3 has only 2 usable points"* ]]
 }
 
+@test "a frame with too few points for a run is told, and what leaves it out" {
+    mkdir e
+    cp s/points/frame_000[0-3].ply e
+    seq 15 | awk '{ print $1, $1 ^ 2 / 15, $1 ^ 3 / 225 }' >few.xyz
+    awk 'BEGIN { print "ply\nformat ascii 1.0\nelement vertex 15\nproperty float x\nproperty float y\nproperty float z\nend_header" } { print }' few.xyz >e/frame_0004.ply
+    run "$NEUPIG" probe e
+    [ "$status" -eq 7 ]
+    [[ "$output" == *"frame 4 has only 15 usable points, fewer than 16: --keep-going skips it"* ]]
+    run "$NEUPIG" run e -o e.out
+    [ "$status" -eq 3 ]
+    [[ "$output" == *"frame 4 ("*"15 usable points of 15, a surface takes 16"* ]]
+}
+
 @test "far from the origin the box is still right" {
     mkdir f
-    printf '1000000.001 5 5\n1000001.001 6 6\n1000000.501 5 6\n1000000.001 5 6\n' >f/f0.xyz
+    seq 0 16 | awk '{ printf "%.3f %g 6\n", 1000000.001 + $1 / 16, 5 + $1 % 2 }' >f/f0.xyz
     run "$NEUPIG" probe f --json
     [ "$status" -eq 0 ]
     [[ "$output" == *"1000000.001"* && "$output" == *"1000001.001"* ]]
