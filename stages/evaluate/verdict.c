@@ -180,9 +180,9 @@ static npg_status list_faults(const npg_verdict *v, npg_late_faults *late)
 
 npg_status npg_verdict_finish(npg_verdict *v, npg_late_faults *late)
 {
-    npg_level fit, dist;
+    npg_level fit = {0}, dist;
     *late = (npg_late_faults){0};
-    NPG_TRY(level_of_all(&fit, v, offsetof(record, fit), 0));
+    if (v->count) NPG_TRY(level_of_all(&fit, v, offsetof(record, fit), 0));
     v->fit = fit.usual;
     if (v->count <= NPG_ALARM_FRAMES) return NPG_OK; /* too few to say what is usual */
     qsort(v->records, v->count, sizeof *v->records, by_index);
