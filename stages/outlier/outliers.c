@@ -18,32 +18,31 @@ typedef struct filter {
     const float *points;
     size_t count, left, neighbours;
     npg_kdtree *tree;
-    float *mean, *far_sq; /* N each, owned: of the distances to the neighbours; to the last of them */
-    float *spread;        /* N, owned: 1 / the dimension of the points around */
-    float *sorted;        /* N, owned: of those that are left, the mean */
-    uint8_t *is_asked;    /* N, owned: a neighbour of the point is gone */
+    npg_arena scratch;    /* holds the arrays of N that follow */
+    float *mean, *far_sq; /* of the distances to the neighbours; to the last of them */
+    float *spread;        /* 1 / the dimension of the points around */
+    float *sorted;        /* of those that are left, the mean */
+    uint8_t *is_asked;    /* a neighbour of the point is gone */
     uint8_t *keep;        /* N, a loan */
-    int threads;
 } filter;
 
 static npg_status open_filter(filter *f)
 {
-    NPG_TRY(npg_alloc_array(&f->mean, NPG_FOR_FRAMES, f->count, sizeof *f->mean));
-    NPG_TRY(npg_alloc_array(&f->far_sq, NPG_FOR_FRAMES, f->count, sizeof *f->far_sq));
-    NPG_TRY(npg_alloc_array(&f->spread, NPG_FOR_FRAMES, f->count, sizeof *f->spread));
-    NPG_TRY(npg_alloc_array(&f->sorted, NPG_FOR_FRAMES, f->count, sizeof *f->sorted));
-    NPG_TRY(npg_alloc(&f->is_asked, NPG_FOR_FRAMES, f->count));
+    npg_arena *a = &f->scratch;
+    a->purpose = NPG_FOR_FRAMES;
+    f->mean = npg_arena_take(a, f->count, sizeof *f->mean);
+    f->far_sq = npg_arena_take(a, f->count, sizeof *f->far_sq);
+    f->spread = npg_arena_take(a, f->count, sizeof *f->spread);
+    f->sorted = npg_arena_take(a, f->count, sizeof *f->sorted);
+    f->is_asked = npg_arena_take(a, f->count, 1);
+    NPG_TRY(npg_arena_status(a));
     return npg_kdtree_open(&f->tree, f->points, f->count);
 }
 
 static void close_filter(filter *f)
 {
     npg_kdtree_close(&f->tree);
-    npg_release(&f->mean);
-    npg_release(&f->far_sq);
-    npg_release(&f->spread);
-    npg_release(&f->sorted);
-    npg_release(&f->is_asked);
+    npg_arena_release(&f->scratch);
 }
 
 /* An npg_kdtree_visit: the point itself is the first of its neighbours.  Around a point of a set of dimension d the
@@ -123,12 +122,8 @@ static npg_status drop(filter *f, size_t *dropped, double threshold)
 npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t count, int neighbours, double ratio,
                              int threads)
 {
-    filter f = {.points = points,
-                .count = count,
-                .left = count,
-                .neighbours = (size_t)neighbours,
-                .keep = keep,
-                .threads = threads};
+    filter f = {
+        .points = points, .count = count, .left = count, .neighbours = (size_t)neighbours, .keep = keep};
     size_t dropped = 1;
     NPG_REQUIRE(neighbours >= 1 && neighbours < NPG_KDTREE_NEIGHBOURS && ratio >= 0);
     memset(keep, 1, count);
