@@ -3,6 +3,7 @@
 small=(--method '{"epochs": 10, "poisson-depth": 6, "window": 10, "overlap": 2,
                   "align-nodes": 300, "align-steps": 8, "segment-min": 4}' --faces 2000
     --bars residual=100,flipped=100,coverage=0
+    --effort quick # one reference and one keyframe: what segments add is the same; "usual" where a test asks for it
     --quiet)
 
 setup_file() {
@@ -221,7 +222,7 @@ for path in glob.glob("two/points/*.ply"): # blue, and red by the frame: the sec
     properties = b"".join(b"property uchar %s\n" % name for name in (b"red", b"green", b"blue"))
     open("painted/" + os.path.basename(path), "wb").write(head + properties + b"end_header\n" + b"".join(rows))
 END
-    "$NEUPIG" run painted -o hues "${small[@]}" --segments auto --keyframe 3
+    "$NEUPIG" run painted -o hues "${small[@]}" --effort usual --segments auto --keyframe 3
     second=$(basename "$(ls -d hues/segment_* | tail -1)")
     [ "$second" != segment_0000 ]
     python3 - segment_0000 "$second" <<'END'
