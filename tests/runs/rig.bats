@@ -151,7 +151,7 @@ assert len(sensors) == 4 and all(s["images"] == 4 and s["overlap"] > 0.02 and s[
 
 @test "a sensor that stands wrong is found, and the run corrects it" {
     numpy
-    "$NEUPIG" synth --rig --cameras 4 --frames 4 --cycles 0.1 --width 640 --height 480 --cell 0.03 --depth-noise 2 \
+    "$NEUPIG" synth --rig --cameras 4 --frames 2 --cycles 0.05 --width 640 --height 480 --cell 0.03 --depth-noise 2 \
         -o wide >synth.log
     run "$NEUPIG" probe wide/rig
     echo "$output"

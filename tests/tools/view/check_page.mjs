@@ -44,6 +44,12 @@ function closestOf(p, corners) {
     return ends.reduce((best, end) => (end.distance < best.distance ? end : best));
 }
 
+/** A ball around a triangle: a face whose ball is farther than the closest so far is not closer. */
+function ballOf(corners) {
+    const middle = [0, 1, 2].map((x) => corners.reduce((sum, q) => sum + q[x], 0) / 3);
+    return { middle, radius: Math.max(...corners.map((q) => Math.hypot(...minus(q, middle)))) };
+}
+
 /** What the page should hold of each vertex, by trying all faces for each point: signed distances spread over corners
  * and their neighbours; NaN where no point fell near. */
 function errorsOf(mesh, points) {
@@ -52,6 +58,7 @@ function errorsOf(mesh, points) {
     const corners = Array.from({ length: faces.length / 3 }, (_, f) =>
         [0, 1, 2].map((k) => at(positions, faces[3 * f + k])),
     );
+    const balls = corners.map(ballOf);
     const normals = Array.from({ length: count }, () => [0, 0, 0]);
     corners.forEach(([a, b, c], f) => {
         const n = cross(minus(b, a), minus(c, a));
@@ -63,6 +70,8 @@ function errorsOf(mesh, points) {
         const p = at(points, i);
         let best = { distance: Infinity };
         corners.forEach((triangle, f) => {
+            const { middle, radius } = balls[f];
+            if (Math.hypot(...minus(middle, p)) - radius > best.distance) return;
             const end = closestOf(p, triangle);
             if (end.distance < best.distance) best = { ...end, f };
         });
