@@ -8,8 +8,9 @@
 
 #include <stdbool.h>
 
+#include "geometry/geometry.h"
 #include "geometry/limits.h"
-#include "pipeline/status.h"
+#include "pipeline/memory.h"
 
 #define NPG_NEIGHBOURS 12 /* of a point, itself among them: of its side, and whether it is isolated */
 
@@ -23,15 +24,21 @@ npg_status npg_normals_estimate(float *normals, const float *points, size_t poin
 void npg_normals_face_sensor(float *normals, size_t *flipped, const float *points, size_t point_count,
                              const double sensor[3]);
 
-/* Winding: unit normals of all points together, outward of what they enclose (to the convex side of what is
- * open): winding.c has the formula.  given (N x 3, unit, some on the wrong side): where to begin, or NULL.  Of
+/* Winding: unit normals of all points together, outward of what they enclose (to one side of what is open:
+ * sheets.c): winding.c has the formula.  given (N x 3, unit, some on the wrong side): where to begin, or NULL.  Of
  * large clouds an even choice of points makes the field, and the normals of all are read from it, as coarse as
  * those points are: npg_winding_is_whole() says whether all took part.  A point without any direction keeps
  * what normals has.  N >= 1.  The time goes with N log N (winding_sums.h).  NPG_MEMORY. */
 npg_status npg_winding_normals(float *normals, const float *points, const float *given, size_t point_count);
 bool npg_winding_is_whole(size_t point_count);
+size_t npg_winding_memory(size_t point_count);
 
-/* Unit normals from nothing: outward for closed bodies, to the convex side for open ones. */
+/* Which points of a sheet face away from the side that its largest part has.  normals: as the winding number has them;
+ * number (N): it, at the points; arrays are the arena's (sheets.c). */
+npg_status npg_sheets_find_away(uint8_t *away, npg_arena *arena, const float *points, const float *normals,
+                                const float *number, const npg_neighbours *near, size_t point_count);
+
+/* Unit normals from nothing: outward for closed bodies, to one side for open ones. */
 npg_status npg_normals_make(float *normals, const float *points, size_t point_count);
 
 /* Find normals on the wrong side among given ones (unit length) and turn them, beginning from the sides given:

@@ -398,7 +398,8 @@ static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
     size_t thinned = points < (size_t)s->point_max ? points : (size_t)s->point_max;
     size_t threads = npg_parallel_parts((size_t)npg_worker_settings(worker)->chunk_frames, 1, 0);
     *chunks_held = 1;
-    return 17 * points + 60 * thinned + (s->sensor_kind == SENSOR_FIND ? npg_one_view_memory() : 0) +
+    return 17 * points + 60 * thinned + npg_winding_memory(thinned) +
+           (s->sensor_kind == SENSOR_FIND ? npg_one_view_memory() : 0) +
            threads * npg_find_isolated_memory(thinned);
 }
 

@@ -132,6 +132,45 @@ static void join(float *normals, const npg_vectors *v, const npg_places *places)
     }
 }
 
+/* w of dipoles as strong as the area that a point stands for, which tells sheets from what is closed: those that were
+ * found make it 1/2 as far as they can. */
+static npg_status find_number_of_areas(field *f, const npg_neighbours *near, double unit)
+{
+    for (size_t i = 0; i < f->places.count; i++) {
+        /* as many others share the disc that reaches to the farthest */
+        float radius_sq =
+            near->dist_sq[NPG_AROUND * ((size_t)f->places.order[i] + 1) - 1] / (float)(unit * unit);
+        float area = (float)M_PI * radius_sq / (NPG_AROUND - 1), length = length_of(&f->dipoles, i);
+        float by = length > 0 ? area / length : 0;
+        f->step.x[i] = by * f->dipoles.x[i];
+        f->step.y[i] = by * f->dipoles.y[i];
+        f->step.z[i] = by * f->dipoles.z[i];
+    }
+    return find_number(f, &f->step);
+}
+
+/* Sheets that enclose nothing: their bulges on one side (sheets.c). */
+static npg_status join_sheets(field *f, const npg_winding_frame *frame, const float *points, size_t n)
+{
+    npg_neighbours near;
+    if (n < NPG_AROUND) return NPG_OK;
+    float *normals = npg_arena_copy(&f->arena, NULL, n, 3 * sizeof *normals);
+    float *number = npg_arena_take(&f->arena, n, sizeof *number);
+    uint8_t *away = npg_arena_take(&f->arena, n, 1);
+    NPG_TRY(npg_neighbours_take(&near, &f->arena, points, n, points, n, NPG_AROUND));
+    NPG_TRY(find_number_of_areas(f, &near, frame->unit));
+    join(normals, &f->dipoles, &f->places);
+    for (size_t i = 0; i < n; i++) number[f->places.order[i]] = f->number[i];
+    NPG_TRY(npg_sheets_find_away(away, &f->arena, points, normals, number, &near, n));
+    for (size_t i = 0; i < n; i++) {
+        if (!away[f->places.order[i]]) continue;
+        f->dipoles.x[i] = -f->dipoles.x[i];
+        f->dipoles.y[i] = -f->dipoles.y[i];
+        f->dipoles.z[i] = -f->dipoles.z[i];
+    }
+    return NPG_OK;
+}
+
 /* At all points, of the field of some of them. */
 static npg_status read_field(float *normals, field *f, const npg_winding_frame *frame, const float *points,
                              size_t n)
@@ -160,6 +199,11 @@ bool npg_winding_is_whole(size_t n)
     return n <= CORE_MAX;
 }
 
+size_t npg_winding_memory(size_t n)
+{
+    return 45 * sizeof(float) * (n < CORE_MAX ? n : CORE_MAX); /* 26 of them for sheets */
+}
+
 npg_status npg_winding_normals(float *normals, const float *points, const float *given, size_t n)
 {
     field f = {.arena.purpose = NPG_FOR_FRAMES};
@@ -173,6 +217,7 @@ npg_status npg_winding_normals(float *normals, const float *points, const float 
     if (!status) status = open_frame(&frame, &noise, core, count);
     if (!status) status = open_field(&f, &frame, core, core_given, count);
     if (!status) status = settle(&f, noise, STEPS);
+    if (!status && !given) status = join_sheets(&f, &frame, core, count);
     if (!status && count == n) join(normals, &f.dipoles, &f.places);
     if (!status && count < n) status = read_field(normals, &f, &frame, points, n);
     npg_arena_release(&f.arena);
