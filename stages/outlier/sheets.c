@@ -109,6 +109,7 @@ static size_t list_seams(sheets *s, seam *out)
 static npg_status find_seams(sheets *s, npg_arena *arena)
 {
     size_t count = list_seams(s, NULL);
+    if (!count) return NPG_OK;
     s->seams = npg_arena_take(arena, count, sizeof *s->seams);
     NPG_TRY(npg_arena_status(arena));
     list_seams(s, s->seams);
