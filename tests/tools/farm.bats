@@ -168,8 +168,10 @@ teardown() {
         tail -n 5 "$slurm"/*.log >&3
         skip "slurmctld, slurmd or munged can't start here"
     fi
-    echo "{\"output\": \"farm\", \"defaults\": {$tiny, $long}, \"captures\": [{\"input\": \"long\", \"name\": \"a\"},
-        {\"input\": \"long\", \"name\": \"b\"}, {\"input\": \"short\", \"name\": \"c\"}]}" >farm.json
+    # both are at work until the last of them has begun, been stopped and been queued again, however busy the machine is
+    "$NEUPIG-bodies" --body bar --frames 241 --points 400 -o longer >>synth.log
+    echo "{\"output\": \"farm\", \"defaults\": {$tiny, $long}, \"captures\": [{\"input\": \"longer\", \"name\": \"a\"},
+        {\"input\": \"longer\", \"name\": \"b\"}, {\"input\": \"short\", \"name\": \"c\"}]}" >farm.json
     job=$(sbatch --parsable --array=1-2 --output="$PWD/task-%a.log" "$samples/batch.sbatch" "$PWD/farm.json" "$PWD/farm")
     is_idle() { [ -z "$(squeue -h -j "$job")" ]; }
     has_state() { grep -q NPGREC01state "farm/$1/job/store.npg" || is_idle; }
