@@ -89,8 +89,8 @@ static const char *const fault_texts[NPG_FAULTS] = {
     "median distance of the points to the surface, in % of the diagonal,",
     "distance of 95 % of the points to the surface, at most, in % of the diagonal,",
     "share of the surface with points near it, in %,",
-    "share of flipped faces, in %,",
-    "share of stretched faces, in %,",
+    "share of the surface that is turned over, in %,",
+    "share of the surface that grew or shrank tenfold, in %,",
     "share of the surface that no points support, in %,",
     "share of the surface where sensors saw that nothing is, in %,",
     "share of the points that have no surface near them, in %,",
@@ -394,9 +394,9 @@ static const npg_option options[] = {
         "cent. A frame with clearly more of it without points than the best quarter of the frames is bad, too; "
         "0: none is"),
     NPG_PART(REAL,          "bars.flipped",     AT(flipped_max),        "1",      0, 100,  "PERCENT",
-        "most of its faces that are turned over, in per cent"),
+        "most of its surface that is turned over, in per cent"),
     NPG_PART(REAL,          "bars.stretched",   AT(stretched_max),      "5",      0, 100,  "PERCENT",
-        "most of its faces that grew or shrank tenfold, in per cent"),
+        "most of its surface that grew or shrank tenfold, in per cent"),
     NPG_PART(REAL,          "bars.unsupported", AT(unsupported_max),    "10",     0, 100,  "PERCENT",
         "most of its surface that has no points near it, neither of the frames that the reference was made "
         "from (of a given mesh: of the keyframe, where its sensors could see it) nor of its own, in per "

@@ -24,7 +24,8 @@ void npg_shape_close(npg_shape **shape);
  * (weighted by their areas in the reference; cosine below -0.2) although it did not in the reference (cosine
  * above 0.2): it was turned over against the rotation of its neighbourhood.  Faces that stand across a crease
  * of the reference are not judged.  A face is stretched when its area is more than 10 or less than 0.1 times
- * that in the reference.  edge_change is the mean of |length / reference length - 1|. */
+ * that in the reference.  Both shares are of the reference's area, as a sliver turns over by a breath.
+ * edge_change is the mean of |length / reference length - 1|. */
 void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float *vert_unit);
 
 /* Misfit: finds where in a frame the surface fails in one place, which is how a change of topology shows:

@@ -108,17 +108,18 @@ static double edge_change(const npg_shape *shape, const float *vert_unit)
 void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float *vert_unit)
 {
     const npg_mesh *mesh = shape->reference;
-    size_t flipped = 0, stretched = 0;
+    double all = 0, flipped = 0, stretched = 0;
     for (size_t f = 0; f < mesh->face_count; f++) {
+        double before = shape->areas[f];
         double area = npg_face_normal(shape->normals + 3 * f, vert_unit, mesh->faces + 3 * f);
-        stretched += area > STRETCH * shape->areas[f] || STRETCH * area < shape->areas[f];
+        all += before;
+        if (area > STRETCH * before || STRETCH * area < before) stretched += before;
     }
     sum_normals(shape);
     for (size_t f = 0; f < mesh->face_count; f++)
-        flipped += shape->cosines[f] > -NPG_AGAINST && cosine_of(shape, f) < NPG_AGAINST;
-    double face_count = mesh->face_count ? (double)mesh->face_count : 1;
-    figures->flipped_share = (double)flipped / face_count;
-    figures->stretched_share = (double)stretched / face_count;
+        if (shape->cosines[f] > -NPG_AGAINST && cosine_of(shape, f) < NPG_AGAINST) flipped += shape->areas[f];
+    figures->flipped_share = all > 0 ? flipped / all : 0;
+    figures->stretched_share = all > 0 ? stretched / all : 0;
     figures->edge_change = edge_change(shape, vert_unit);
 }
 

@@ -125,6 +125,21 @@ static void a_vertex_pushed_over_its_neighbours_flips_faces(void **state)
     assert_true(figures.edge_change > 0 && figures.edge_change < 0.01);
 }
 
+static double flipped_by(shape_case *c, int ring)
+{
+    memcpy(c->moved, c->mesh->vert_pos, sizeof(float) * 3 * VERTS);
+    memcpy(c->moved + 3 * (size_t)ring_vertex(ring, 5), c->mesh->vert_pos + 3 * (size_t)ring_vertex(ring, 7),
+           12);
+    return measure(c).flipped_share;
+}
+
+static void what_is_turned_over_counts_by_its_area(void **state)
+{
+    shape_case *c = *state; /* the second ring's faces are slivers */
+    double slivers = flipped_by(c, 2), usual = flipped_by(c, RINGS / 2);
+    assert_true(slivers > 0 && slivers < usual / 2);
+}
+
 static void a_fold_of_many_faces_is_not_many_flips(void **state)
 {
     shape_case *c = *state; /* the upper half dented into the lower: flips at most along the crease */
@@ -481,6 +496,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(a_vertex_pushed_over_its_neighbours_flips_faces, open_shape,
                                         close_shape),
         cmocka_unit_test_setup_teardown(a_fold_of_many_faces_is_not_many_flips, open_shape, close_shape),
+        cmocka_unit_test_setup_teardown(what_is_turned_over_counts_by_its_area, open_shape, close_shape),
         cmocka_unit_test_setup_teardown(a_flattened_face_is_stretched_not_flipped, open_shape, close_shape),
         cmocka_unit_test(distances_are_those_that_were_made),
         cmocka_unit_test(vertex_distances_agree_with_the_plain_way),
