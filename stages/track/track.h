@@ -189,7 +189,10 @@ void npg_prior_count(const npg_occlusion_prior *prior, float *since, const float
  * (1 but for links, occlusion_prior.c).  a grows from 0 to 1 over the first 2/3 of the steps; another effort
  * has other numbers for 10 and 0.08.  d: mean distance of the points from the surface in the step before, so the
  * noisier they are the more of them must agree before the surface gives way.  L: longest side of the reference
- * against that of the box of all frames.  One sensor leaves half of the body to the edges.  Samples without a
+ * against that of the box of all frames.  One sensor leaves half of the body to the edges.  Without known sensors
+ * a surface with a border is taken to end where the points do: for a point whose c_p is on it, and for a sample on
+ * it that is farther from p_s than 2.5 times the mean of the step before, n is the way to the other, which holds
+ * a sheet in its own plane, across which n would let it slide.  Samples without a
  * point within 3 w, or whose nearest is another part's, have no part; those where a sensor saw that nothing is
  * go the shortest way out of there (npg_free_space_leave()), where they are held until they have a point, and w is
  * at least as long as that is.  What a fit comes to is its Chamfer distance of what can be compared; before images,
@@ -215,14 +218,15 @@ typedef struct npg_tracker_settings {
 
 /* How well it went, lengths in units. */
 typedef struct npg_tracked {
-    double point_dist_mean; /* target points -> surface, mean of distances                        */
-    double point_dist_sq;   /* the same, mean of squares                                          */
-    double chamfer;         /* mean of squared distances, points -> surface and surface -> points */
-    double explained;       /* share of the target points that it has a place for                 */
-    double astray;          /* by depth images: lost points + 2 x samples where nothing is, shares  */
-    double cost;            /* what poses of a frame are compared by                              */
-    bool by_images;         /* `cost` is theirs, else the Chamfer distance; `astray` is known     */
-    double change;          /* the last step's largest movement of a node                         */
+    double point_dist_mean;  /* target points -> surface, mean of distances                        */
+    double sample_dist_mean; /* surface, as far as it is seen -> points, mean of distances         */
+    double point_dist_sq;    /* target points -> surface, mean of squares                          */
+    double chamfer;          /* mean of squared distances, points -> surface and surface -> points */
+    double explained;        /* share of the target points that it has a place for                 */
+    double astray;           /* by depth images: lost points + 2 x samples where nothing is, shares */
+    double cost;             /* what poses of a frame are compared by                              */
+    bool by_images;          /* `cost` is theirs, else the Chamfer distance; `astray` is known     */
+    double change;           /* the last step's largest movement of a node                         */
     int steps;
 } npg_tracked;
 

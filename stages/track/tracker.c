@@ -296,13 +296,26 @@ static void hit_normal(double normal[3], const npg_tracker *t, const npg_surface
     for (size_t i = 0; i < 3; i++) normal[i] /= fmax(sqrt(size), 1e-9);
 }
 
+static bool is_on_border(const npg_tracker *t, const npg_surface_hit *hit)
+{
+    return t->is_open && npg_hit_on_border(hit, t->mesh->faces + 3 * (size_t)hit->face, t->is_border);
+}
+
 /* Whether a point that a sensor saw can be of the surface that is nearest to it: a side that faces a sensor,
  * and not the border of what is known, beyond which the body goes on. */
 static bool could_be_seen(const npg_tracker *t, const npg_tracker_cloud *cloud, const npg_surface_hit *hit,
                           const float *point, const double normal[3])
 {
-    return !npg_hit_on_border(hit, t->mesh->faces + 3 * (size_t)hit->face, t->is_border) &&
+    return !is_on_border(t, hit) &&
            npg_faces_sensor(cloud->sensors, cloud->sensor_count, point, normal, NPG_AGAINST);
+}
+
+/* The distance to a border grows along the way there, in the surface's plane: that is what holds a sheet in its own. */
+static void take_way(double normal[3], const float *place, const double target[3])
+{
+    double way[3];
+    for (size_t a = 0; a < 3; a++) way[a] = target[a] - (double)place[a];
+    if (npg_vec3_make_unit(way)) memcpy(normal, way, sizeof way);
 }
 
 /* What all of a step's threads read. */
@@ -314,6 +327,7 @@ typedef struct step {
     const float *normals; /* of the points, or NULL where they have no say */
     double width, stiffness;
     double within; /* what is farther from all points than this has none of its own */
+    double apart;  /* the same of a border, which points end at */
     bool is_first, is_settling;
 } step;
 
@@ -348,6 +362,13 @@ static void set_targets(const step *s, size_t first, size_t last)
         sums.explained += (double)hit->dist_sq <= NPG_BEYOND * NPG_BEYOND * s->width * s->width;
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
+        if (!s->cloud->sensor_count && is_on_border(t, hit)) {
+            float place[3] = {0};
+            for (size_t c = 0; c < 9; c++)
+                place[c % 3] += hit->weights[c / 3] *
+                                t->vert_pos[3 * t->mesh->faces[3 * (size_t)hit->face + c / 3] + c % 3];
+            take_way(p.normal, place, p.target);
+        }
         set_pull(term, t, &p, s->pose, 1 / (double)t->target_count, s->width);
     }
     if (first < last) t->sums[first / GRAIN] = sums;
@@ -401,6 +422,9 @@ static void set_sample(npg_block_term *term, const step *s, size_t i)
     }
     memcpy(p.nodes, t->graph->vert_node + v * NPG_GRAPH_BIND, sizeof p.nodes);
     memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
+    /* the border of a sheet that hangs over, by more than points are apart */
+    if (!s->cloud->sensor_count && t->is_border[v] && (double)t->near_sq[i] > s->apart * s->apart)
+        take_way(p.normal, t->sample_pos + 3 * i, p.target);
     if (has_point(s, i, facing))
         set_pull(term, t, &p, s->pose, weight, s->width);
     else if (t->is_empty[i] || t->outs[i].is_taken)
@@ -572,17 +596,19 @@ static npg_status set_terms(void *user, size_t part)
 /* Surface -> points: its part of the Chamfer distance, of what could be seen, and of the cost. */
 static void sum_up_samples(npg_tracked *tracked, const npg_tracker *t)
 {
-    double sum = 0, cost = 0;
+    double sum = 0, cost = 0, dist = 0;
     size_t seen = 0, empty = 0, both = 0;
     for (size_t i = 0; i < t->sample_count; i++) {
         double dist_sq = t->is_seen[i] ? (double)t->near_sq[i] : 0;
         sum += dist_sq;
+        dist += sqrt(dist_sq);
         seen += t->is_seen[i];
         empty += t->is_empty[i];
         both += t->is_seen[i] || t->is_empty[i];
         cost += t->is_empty[i] ? 1 : bounded(t, dist_sq);
     }
     tracked->chamfer += seen ? sum / (double)seen : 0;
+    tracked->sample_dist_mean = seen ? dist / (double)seen : 0;
     tracked->cost += both ? cost / (double)both : 0;
     /* twice: half of the samples may be hidden, where nothing tells of them */
     tracked->astray = 2 * (double)empty / (double)t->sample_count;
@@ -643,6 +669,7 @@ static void set_schedule(step *s, const npg_tracked *tracked, const npg_tracker_
     if (s->cloud->sensor_count == 1) s->stiffness *= ONE_SIDE;
     s->width = s->t->size * effort->width_unit * pow(WIDTH_END / effort->width_unit, progress);
     s->within = NPG_WITHIN * tracked->point_dist_mean;
+    s->apart = tracked->steps ? NPG_WITHIN * tracked->sample_dist_mean : HUGE_VAL;
     s->width = fmax(s->width, s->within);
 }
 

@@ -12,6 +12,7 @@
 #include "geometry/geometry.h"
 #include "tests/support/ball_mesh.h"
 #include "tests/support/image_space.h"
+#include "tests/support/shapes.h"
 #include "track/track.h"
 
 static void thin_meshes_are_made_of_the_whole_one_s_vertices(void **state)
@@ -69,6 +70,51 @@ static void a_fine_reference_is_aligned_whole(void **state)
     npg_release(&pose);
     npg_tracker_close(&tracker);
     npg_mesh_unref(&ball);
+}
+
+/* Points beyond its border are all that says so. */
+static void a_sheet_that_moves_in_its_plane_is_followed(void **state)
+{
+    enum { COLUMNS = 41, ROWS = 25, POINTS = 3000 };
+    static const npg_tracker_settings settings = {100, 1500, 15, 0.1, 0.02};
+    static float points[3 * POINTS], found[3 * COLUMNS * ROWS];
+    npg_mesh *sheet;
+    npg_tracker *tracker;
+    npg_tracked tracked;
+    double *pose, moved = 0;
+    shape_random r = {3};
+    (void)state;
+    assert_int_equal(npg_mesh_open(&sheet, COLUMNS * ROWS, (size_t)2 * (COLUMNS - 1) * (ROWS - 1)), NPG_OK);
+    assert_int_equal(
+        npg_alloc_array(&sheet->vert_normals, NPG_FOR_MESH, sheet->vert_count, 3 * sizeof(float)), NPG_OK);
+    size_t f = 0;
+    for (uint32_t v = 0; v < COLUMNS * ROWS; v++) {
+        uint32_t x = v % COLUMNS, y = v / COLUMNS;
+        memcpy(sheet->vert_pos + 3 * v, (float[]){(float)x / 20 - 1, (float)y / 20 - 0.6f, 0},
+               3 * sizeof(float));
+        memcpy(sheet->vert_normals + 3 * v, (float[]){0, 0, 1}, 3 * sizeof(float));
+        if (x + 1 == COLUMNS || y + 1 == ROWS) continue;
+        memcpy(sheet->faces + 3 * f++, (uint32_t[]){v, v + 1, v + COLUMNS + 1}, 3 * sizeof(uint32_t));
+        memcpy(sheet->faces + 3 * f++, (uint32_t[]){v, v + COLUMNS + 1, v + COLUMNS}, 3 * sizeof(uint32_t));
+    }
+    for (size_t i = 0; i < POINTS; i++) {
+        points[3 * i] = (float)shape_uniform(&r) * 2 - 1 + 0.1f;
+        points[3 * i + 1] = (float)shape_uniform(&r) * 1.2f - 0.6f;
+    }
+    assert_int_equal(npg_tracker_open(&tracker, sheet, &settings), NPG_OK);
+    size_t nodes = npg_tracker_node_count(tracker);
+    assert_int_equal(npg_alloc_array(&pose, NPG_FOR_RUN, nodes, NPG_POSE_SIZE * sizeof(double)), NPG_OK);
+    npg_pose_rest(pose, nodes);
+    const npg_tracker_cloud cloud = {.points = points, .count = POINTS};
+    assert_int_equal(npg_tracker_fit(tracker, &tracked, pose, &cloud, NULL, NULL), NPG_OK);
+    npg_tracker_vertices(tracker, found, pose);
+    for (size_t v = 0; v < COLUMNS * ROWS; v++)
+        moved += ((double)found[3 * v] - (double)sheet->vert_pos[3 * v]) / (COLUMNS * ROWS);
+    print_message("moved by %.4f of 0.1\n", moved);
+    assert_true(moved > 0.05 && moved < 0.11);
+    npg_release(&pose);
+    npg_tracker_close(&tracker);
+    npg_mesh_unref(&sheet);
 }
 
 /* Two balls as one mesh, the second a quarter as large and beside the first. */
@@ -280,6 +326,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_piece_without_points_goes_along),
+        cmocka_unit_test(a_sheet_that_moves_in_its_plane_is_followed),
         cmocka_unit_test(a_part_without_points_is_not_drawn_to_another),
         cmocka_unit_test(surface_where_nothing_is_is_pulled_out),
         cmocka_unit_test(what_has_left_empty_space_stays_out),
