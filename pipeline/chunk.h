@@ -64,8 +64,8 @@ typedef struct npg_figures {
     double point_dist_median, point_dist_mean, point_dist_p95; /* points -> surface */
     double vertex_dist_mean;                                   /* surface vertices -> nearest point */
     double coverage;        /* share of the surface area in sight with points near it, 0..1 */
-    double flipped_share;   /* faces turned over against their neighbourhood's rotation, share of the area */
-    double stretched_share; /* faces whose area is > 10 x or < 0.1 x that of the reference, share of its area */
+    double flipped_share;   /* faces turned over against their neighbourhood's rotation, share by area */
+    double stretched_share; /* faces whose area is > 10 x or < 0.1 x that of the reference, by area */
     double edge_change;     /* mean |length / reference length - 1| */
     double chamfer;         /* 0.5 (mean d^2 points->surface + mean d^2 vertices->points), x 1e5 */
     /* Share of the area that no points are near, of this frame or of those that the reference was made from
