@@ -33,7 +33,7 @@ figure() { sed -n "s/.*\"$1\": \([0-9.e-]*\).*/\1/p" figures.json | head -n 1; }
 
 @test "eight frames, sixty epochs" {
     "$NEUPIG" synth --frames 8 --points 1500 --cycles 0.4 --cell 0.04 -o capture >synth.log
-    "$NEUPIG" run capture/points -o out --method '{"preset": "paper", "epochs": 60, "poisson-depth": 6}' --faces 1000 --bars residual=100,coverage=0 --quiet
+    "$NEUPIG" run capture/points -o out --method '{"preset": "paper", "epochs": 60, "poisson-depth": 6}' --faces 1000 --bars residual=100,coverage=0,flipped=100 --quiet
     "$NEUPIG" eval out capture --samples 20000 --json >figures.json
     cat figures.json
     awk -v cd="$(figure CD)" -v corr="$(figure Corr)" 'BEGIN { exit !(cd > 0 && cd < 2.5 && corr > 0 && corr < 0.0178) }'
