@@ -284,6 +284,17 @@ npg_status npg_mesh_twins(uint32_t *twin, const uint32_t *faces, size_t face_cou
 /* is_border (V): whether a vertex lies on the border; *found (or NULL): whether there is one.  NPG_MEMORY. */
 npg_status npg_mesh_border(uint8_t *is_border, bool *found, const npg_mesh *mesh);
 
+/* out (width) = the mean over a face's corners of rows (V x width), by a hit's weights. */
+static inline void npg_hit_blend(float *out, const npg_surface_hit *hit, const uint32_t *faces,
+                                 const float *rows, size_t width)
+{
+    const uint32_t *corners = faces + 3 * (size_t)hit->face;
+    for (size_t i = 0; i < width; i++) {
+        out[i] = 0;
+        for (size_t k = 0; k < 3; k++) out[i] += hit->weights[k] * rows[width * corners[k] + i];
+    }
+}
+
 /* Whether the closest point of the surface lies on its border: corners are those of the face that was hit. */
 static inline bool npg_hit_on_border(const npg_surface_hit *hit, const uint32_t corners[3],
                                      const uint8_t *is_border)

@@ -122,16 +122,6 @@ void npg_skin_pose(npg_skin *c, const float *vert_unit)
 
 /* ---- points ---- */
 
-/* out = the mean over a face's corners of rows (V x width), by a hit's weights. */
-static void at_hit(float *out, const npg_skin *c, const npg_surface_hit *hit, const float *rows, size_t width)
-{
-    for (size_t i = 0; i < width; i++) {
-        out[i] = 0;
-        for (size_t corner = 0; corner < 3; corner++)
-            out[i] += hit->weights[corner] * rows[width * c->mesh->faces[3 * (size_t)hit->face + corner] + i];
-    }
-}
-
 /* Nearly the rotation nearest to a sum of similar ones: its rows made orthonormal (Gram and Schmidt). */
 static void straighten(float m[9])
 {
@@ -153,11 +143,11 @@ static void to_rest(npg_skinned *out, const npg_skin *c, const npg_surface_hit *
                     const float *normal)
 {
     float now[3], facing_now[3], turn[9], away[3];
-    at_hit(now, c, hit, c->now, 3);
-    at_hit(facing_now, c, hit, c->normals, 3);
-    at_hit(turn, c, hit, c->turns, 9);
-    at_hit(out->foot, c, hit, c->mesh->vert_pos, 3);
-    at_hit(out->facing, c, hit, c->mesh->vert_normals, 3);
+    npg_hit_blend(now, hit, c->mesh->faces, c->now, 3);
+    npg_hit_blend(facing_now, hit, c->mesh->faces, c->normals, 3);
+    npg_hit_blend(turn, hit, c->mesh->faces, c->turns, 9);
+    npg_hit_blend(out->foot, hit, c->mesh->faces, c->mesh->vert_pos, 3);
+    npg_hit_blend(out->facing, hit, c->mesh->faces, c->mesh->vert_normals, 3);
     npg_vec3_make_unitf(facing_now);
     npg_vec3_make_unitf(out->facing);
     straighten(turn);
@@ -213,9 +203,9 @@ static void carry(const npg_skin *c, float now[3], float turn[9], const npg_surf
                   const float place[3])
 {
     float rest[3], away[3];
-    at_hit(rest, c, hit, c->mesh->vert_pos, 3);
-    at_hit(now, c, hit, c->now, 3);
-    at_hit(turn, c, hit, c->turns, 9);
+    npg_hit_blend(rest, hit, c->mesh->faces, c->mesh->vert_pos, 3);
+    npg_hit_blend(now, hit, c->mesh->faces, c->now, 3);
+    npg_hit_blend(turn, hit, c->mesh->faces, c->turns, 9);
     straighten(turn);
     for (int k = 0; k < 3; k++) away[k] = place[k] - rest[k];
     add_turned(now, turn, away);

@@ -186,14 +186,10 @@ static npg_status measure_gaps(way_back *w)
     NPG_TRY(npg_mesh_closest(w->hits, m, widening->points, widening->count));
     for (size_t i = 0; i < widening->count; i++) {
         const npg_surface_hit *hit = &w->hits[i];
-        const uint32_t *corner = m->faces + 3 * (size_t)hit->face;
         const float *point = widening->points + 3 * i, *normal = widening->normals + 3 * i;
-        float along = 0;
-        for (size_t a = 0; a < 3; a++) {
-            float on = 0;
-            for (size_t k = 0; k < 3; k++) on += hit->weights[k] * m->vert_pos[3 * (size_t)corner[k] + a];
-            along += (point[a] - on) * normal[a];
-        }
+        float on[3], along = 0;
+        npg_hit_blend(on, hit, m->faces, m->vert_pos, 3);
+        for (size_t a = 0; a < 3; a++) along += (point[a] - on[a]) * normal[a];
         bool is_of_it = (double)hit->dist_sq < widening->spacing * widening->spacing;
         for (size_t a = 0; a < 3; a++) w->gaps[3 * i + a] = is_of_it ? along * normal[a] : 0;
     }

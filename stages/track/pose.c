@@ -1,7 +1,8 @@
-/* Pose: products of the nodes' rotations. */
+/* Pose: products of the nodes' rotations, and steps of a fit. */
 #include "track/track.h"
 
 #include <math.h>
+#include <string.h>
 
 void npg_pose_straighten(double m[9])
 {
@@ -123,4 +124,57 @@ npg_status npg_pose_of(double *pose, const npg_graph *graph, const float *rest, 
     }
     npg_arena_release(&scratch);
     return status;
+}
+
+/* ---- a step ---- */
+
+#define TURN_MAX 0.6  /* of a node in one step, radians */
+#define MOVE_MAX 0.15 /* units                          */
+
+/* rotation = exp(omega) rotation (Rodrigues). */
+static void turn(double rotation[9], const double omega[3])
+{
+    double angle = npg_vec3_length(omega), m[9], out[9];
+    double s = angle > 1e-9 ? sin(angle) / angle : 1,
+           c = angle > 1e-9 ? (1 - cos(angle)) / (angle * angle) : 0.5;
+    const double x[9] = {0, -omega[2], omega[1], omega[2], 0, -omega[0], -omega[1], omega[0], 0};
+    for (int i = 0; i < 9; i++) {
+        double square = 0;
+        for (int k = 0; k < 3; k++) square += x[i / 3 * 3 + k] * x[3 * k + i % 3];
+        m[i] = (i % 4 == 0) + s * x[i] + c * square;
+    }
+    for (int i = 0; i < 9; i++) {
+        out[i] = 0;
+        for (int k = 0; k < 3; k++) out[i] += m[i / 3 * 3 + k] * rotation[3 * k + i % 3];
+    }
+    memcpy(rotation, out, sizeof out);
+}
+
+/* The share of a step that turns and moves no node by more than the largest allowed: a linearised turn means
+ * nothing beyond. */
+static double share_of_step(const double *steps, size_t node_count)
+{
+    double largest = 0;
+    for (size_t k = 0; k < node_count; k++)
+        for (size_t half = 0; half < 2; half++) {
+            const double *d = steps + 6 * k + 3 * half;
+            largest = fmax(largest, npg_vec3_length(d) / (half ? MOVE_MAX : TURN_MAX));
+        }
+    return largest > 1 ? 1 / largest : 1;
+}
+
+double npg_pose_step(double *pose, double *steps, size_t node_count)
+{
+    double largest = 0, share = share_of_step(steps, node_count);
+    for (size_t k = 0; k < node_count; k++) {
+        double *d = steps + 6 * k, moved = 0;
+        for (int i = 0; i < 6; i++) d[i] *= share;
+        turn(pose + k * NPG_POSE_SIZE, d);
+        for (int i = 0; i < 3; i++) {
+            pose[k * NPG_POSE_SIZE + 9 + (size_t)i] += d[3 + i];
+            moved += d[3 + i] * d[3 + i];
+        }
+        largest = fmax(largest, moved);
+    }
+    return sqrt(largest);
 }

@@ -99,6 +99,10 @@ npg_status npg_pose_between(npg_rigid *motion, const npg_graph *graph, const dou
  * how far the pose is from moving the body as one piece.  NPG_MEMORY. */
 npg_status npg_pose_bend(double *bend, const npg_graph *graph, const double *pose);
 
+/* Turns and moves each node by its steps (K x 6: omega, then a move; exp(omega) by Rodrigues' formula), all scaled alike
+ * where one is too large for a linearised turn.  steps: as they were taken, after it.  Returns the largest move. */
+double npg_pose_step(double *pose, double *steps, size_t node_count);
+
 /* Visible: which places of a surface sensors can see, in the pose at work.
  *
  * A sensor sees a place that faces it and has none of the surface before it.  What no sensor sees must not be

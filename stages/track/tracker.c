@@ -15,8 +15,6 @@
 #define NOISE_UNIT  0.003 /* mean distance of points at which the stiffness has doubled       */
 #define WIDTH_START 0.08  /* of the robust weight, in units: what may move between two frames */
 #define WIDTH_END   0.01  /* at the last step, more where the points are noisy                */
-#define TURN_MAX    0.6   /* of a node in one step, radians                                   */
-#define MOVE_MAX    0.15  /* units                                                            */
 #define REVERSE     0.5   /* weight of surface -> points against points -> surface            */
 /* Set by trial, like those above. */
 #define SCHEDULE 1.5 /* stiffness and width are final after 2/3 of the steps; the last third settles */
@@ -98,6 +96,12 @@ const npg_graph *npg_tracker_graph(const npg_tracker *tracker)
 const npg_mesh *npg_tracker_reference(const npg_tracker *tracker)
 {
     return tracker->reference;
+}
+
+void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose)
+{
+    npg_pose_rows(tracker->rows, tracker->whole, pose);
+    npg_pose_vertices(vert_unit, tracker->whole, tracker->rows, tracker->reference->vert_pos);
 }
 
 void npg_tracker_close(npg_tracker **slot)
@@ -215,10 +219,9 @@ static void bind_face_point(pull *p, const npg_tracker *t, const npg_surface_hit
     uint32_t nodes[3 * NPG_GRAPH_BIND];
     float weights[3 * NPG_GRAPH_BIND], sum = 0;
     int count = 0;
-    memset(p->rest, 0, sizeof p->rest);
+    npg_hit_blend(p->rest, hit, t->mesh->faces, t->mesh->vert_pos, 3);
     for (int corner = 0; corner < 3; corner++) {
         size_t v = t->mesh->faces[3 * (size_t)hit->face + (size_t)corner];
-        for (size_t i = 0; i < 3; i++) p->rest[i] += hit->weights[corner] * t->mesh->vert_pos[3 * v + i];
         for (size_t b = 0; b < NPG_GRAPH_BIND; b++) {
             uint32_t node = t->graph->vert_node[v * NPG_GRAPH_BIND + b];
             float weight = hit->weights[corner] * t->graph->vert_weight[v * NPG_GRAPH_BIND + b];
@@ -311,10 +314,10 @@ static bool could_be_seen(const npg_tracker *t, const npg_tracker_cloud *cloud, 
 }
 
 /* The distance to a border grows along the way there, in the surface's plane: that is what holds a sheet in its own. */
-static void take_way(double normal[3], const float *place, const double target[3])
+static void take_way(double normal[3], const float *from, const float *to)
 {
     double way[3];
-    for (size_t a = 0; a < 3; a++) way[a] = target[a] - (double)place[a];
+    npg_vec3_between(way, from, to);
     if (npg_vec3_make_unit(way)) memcpy(normal, way, sizeof way);
 }
 
@@ -363,11 +366,9 @@ static void set_targets(const step *s, size_t first, size_t last)
         bind_face_point(&p, t, hit);
         for (size_t c = 0; c < 3; c++) p.target[c] = (double)t->targets[3 * i + c];
         if (!s->cloud->sensor_count && is_on_border(t, hit)) {
-            float place[3] = {0};
-            for (size_t c = 0; c < 9; c++)
-                place[c % 3] += hit->weights[c / 3] *
-                                t->vert_pos[3 * t->mesh->faces[3 * (size_t)hit->face + c / 3] + c % 3];
-            take_way(p.normal, place, p.target);
+            float place[3];
+            npg_hit_blend(place, hit, t->mesh->faces, t->vert_pos, 3);
+            take_way(p.normal, place, t->targets + 3 * i);
         }
         set_pull(term, t, &p, s->pose, 1 / (double)t->target_count, s->width);
     }
@@ -424,7 +425,7 @@ static void set_sample(npg_block_term *term, const step *s, size_t i)
     memcpy(p.weights, t->graph->vert_weight + v * NPG_GRAPH_BIND, sizeof p.weights);
     /* the border of a sheet that hangs over, by more than points are apart */
     if (!s->cloud->sensor_count && t->is_border[v] && (double)t->near_sq[i] > s->apart * s->apart)
-        take_way(p.normal, t->sample_pos + 3 * i, p.target);
+        take_way(p.normal, t->sample_pos + 3 * i, s->cloud->points + 3 * near);
     if (has_point(s, i, facing))
         set_pull(term, t, &p, s->pose, weight, s->width);
     else if (t->is_empty[i] || t->outs[i].is_taken)
@@ -445,62 +446,6 @@ static void set_edge(npg_block_term *term, const step *s, size_t e)
     turn_arm(term->arms[0], pj, edge);
     for (int i = 0; i < 3; i++)
         term->right[i] = (double)gk[i] + pk[9 + i] - (double)gj[i] - pj[9 + i] - term->arms[0][i];
-}
-
-/* ---- moving ---- */
-
-/* rotation = exp(omega) rotation (Rodrigues). */
-static void turn(double rotation[9], const double omega[3])
-{
-    double angle = npg_vec3_length(omega), m[9], out[9];
-    double s = angle > 1e-9 ? sin(angle) / angle : 1,
-           c = angle > 1e-9 ? (1 - cos(angle)) / (angle * angle) : 0.5;
-    const double x[9] = {0, -omega[2], omega[1], omega[2], 0, -omega[0], -omega[1], omega[0], 0};
-    for (int i = 0; i < 9; i++) {
-        double square = 0;
-        for (int k = 0; k < 3; k++) square += x[i / 3 * 3 + k] * x[3 * k + i % 3];
-        m[i] = (i % 4 == 0) + s * x[i] + c * square;
-    }
-    for (int i = 0; i < 9; i++) {
-        out[i] = 0;
-        for (int k = 0; k < 3; k++) out[i] += m[i / 3 * 3 + k] * rotation[3 * k + i % 3];
-    }
-    memcpy(rotation, out, sizeof out);
-}
-
-/* The share of a step that turns and moves no node by more than the largest allowed: a linearised turn means
- * nothing beyond. */
-static double share_of_step(const npg_tracker *t)
-{
-    double largest = 0;
-    for (size_t k = 0; k < t->graph->node_count; k++)
-        for (size_t half = 0; half < 2; half++) {
-            const double *d = t->step + 6 * k + 3 * half;
-            largest = fmax(largest, npg_vec3_length(d) / (half ? MOVE_MAX : TURN_MAX));
-        }
-    return largest > 1 ? 1 / largest : 1;
-}
-
-static double move_nodes(npg_tracker *t, double *pose)
-{
-    double largest = 0, share = share_of_step(t);
-    for (size_t k = 0; k < t->graph->node_count; k++) {
-        double *d = t->step + 6 * k, moved = 0;
-        for (int i = 0; i < 6; i++) d[i] *= share;
-        turn(pose + k * NPG_POSE_SIZE, d);
-        for (int i = 0; i < 3; i++) {
-            pose[k * NPG_POSE_SIZE + 9 + (size_t)i] += d[3 + i];
-            moved += d[3 + i] * d[3 + i];
-        }
-        largest = fmax(largest, moved);
-    }
-    return sqrt(largest);
-}
-
-void npg_tracker_vertices(const npg_tracker *tracker, float *vert_unit, const double *pose)
-{
-    npg_pose_rows(tracker->rows, tracker->whole, pose);
-    npg_pose_vertices(vert_unit, tracker->whole, tracker->rows, tracker->reference->vert_pos);
 }
 
 /* ---- a step: pairs of both directions, then terms, in grains of targets and samples, and of edges ---- */
@@ -681,7 +626,7 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
     npg_block_solve(t->system, t->step, 1e-9, 1e-3, 60);
     for (size_t i = 0; i < 6 * t->graph->node_count; i++)
         if (!isfinite(t->step[i])) return npg_error(NPG_DIVERGED, "the coarse alignment is not finite");
-    tracked->change = move_nodes(t, pose);
+    tracked->change = npg_pose_step(pose, t->step, t->graph->node_count);
     tracked->steps++;
     return NPG_OK;
 }
