@@ -104,6 +104,9 @@ static const char *const fault_texts[NPG_FAULTS] = {
  * the bar on the median, a lost limb and a surface that follows noise are clearly above it. */
 static fault fault_of(const evaluate_state *state, const npg_figures *f, double unseen_share)
 {
+    /* Without images only those that are missed in one place tell a limb from noise. */
+    bool has_images = !isnan(f->lost_share);
+    double far = isnan(f->misfits[NPG_MISFIT_FAR].share) ? 0 : f->misfits[NPG_MISFIT_FAR].share;
     const fault kinds[] = {
         {NPG_FAULT_MEDIAN, f->point_dist_median, state->residual_max},
         {NPG_FAULT_P95, f->point_dist_p95, NPG_CLEARLY * state->residual_max},
@@ -114,7 +117,8 @@ static fault fault_of(const evaluate_state *state, const npg_figures *f, double 
         {NPG_FAULT_UNSUPPORTED, isnan(f->unsupported_share) ? 0 : f->unsupported_share,
          state->unsupported_max},
         {NPG_FAULT_NOWHERE, isnan(f->nowhere_share) ? 0 : f->nowhere_share, state->nowhere_max},
-        {NPG_FAULT_LOST, isnan(f->lost_share) ? 0 : f->lost_share, state->lost_max}};
+        {NPG_FAULT_LOST, has_images ? f->lost_share : far,
+         has_images ? state->lost_max : state->lost_max / NPG_CLEARLY}};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         double value = 100 * kinds[i].value, bound = kinds[i].bound;
         bool is_above = kinds[i].kind == NPG_FAULT_COVERAGE ? value >= bound : value <= bound;
