@@ -123,7 +123,7 @@ typedef struct npg_facts {
     /* evaluate, at the end of a fusing pass and of the solving one; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */
-    int64_t unfit_count;   /* of a fusing pass: frames below the bar by themselves ...   */
+    int64_t unfit_count;   /* of a fusing pass: frames below the bar ...                  */
     int64_t unfit_worst;   /* ... and the index of the one that is farthest below it     */
     /* job, before the first pass */
     bool is_resumed;       /* all facts above are known; only the solving pass is walked */

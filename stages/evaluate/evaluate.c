@@ -193,17 +193,23 @@ static npg_status take_frame(npg_worker *worker, npg_frame *frame, bool is_new)
 }
 
 /* When all frames are there: what is wrong with some beside the others. */
-static npg_status judge_together(npg_worker *worker)
+static npg_status find_late(npg_worker *worker, npg_late_faults *late)
 {
     evaluate_state *state = npg_worker_state(worker);
-    npg_late_faults *late;
     state->verdict.key = npg_worker_facts(worker)->plan.key;
     state->verdict.bars =
         (npg_verdict_bars){state->coverage_min > 0 ? (1 - state->coverage_min / 100) / 2 : 1,
                            fmax(state->measured.cover_dist, state->residual_max) / 100,
                            state->residual_max / 100, npg_worker_facts(worker)->sensor_count_max > 0};
+    return npg_verdict_finish(&state->verdict, late);
+}
+
+static npg_status judge_together(npg_worker *worker)
+{
+    evaluate_state *state = npg_worker_state(worker);
+    npg_late_faults *late;
     NPG_TRY(npg_alloc(&late, NPG_FOR_RUN, sizeof *late));
-    npg_status status = npg_verdict_finish(&state->verdict, late);
+    npg_status status = find_late(worker, late);
     for (size_t i = 0; i < late->count && !status; i++) {
         const fault found = {late->faults[i].fault, late->faults[i].value, late->faults[i].bound};
         status = note_bad(state, late->faults[i].number, &found);
@@ -261,21 +267,34 @@ static void report_verdict(json_t *report, const evaluate_state *state, double u
 }
 
 /* Of a fusing pass nobody is told but the reference's owner. */
-static void note_unfit(npg_worker *worker, const npg_frame *frame)
+static void count_unfit(evaluate_state *state, int64_t index, const fault *found)
+{
+    if (!state->unfit_count++ || times_of(found) > times_of(&state->worst)) {
+        state->worst = *found;
+        state->unfit_worst = index;
+    }
+}
+
+static npg_status note_unfit(npg_worker *worker, npg_frame *frame)
 {
     evaluate_state *state = npg_worker_state(worker);
-    if (frame->is_shared || frame->is_skipped || isnan(frame->figures.coverage)) return;
+    if (frame->is_shared || frame->is_skipped || isnan(frame->figures.coverage)) return NPG_OK;
     fault found = fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share);
-    if (!found.kind) return;
-    if (!state->unfit_count++ || times_of(&found) > times_of(&state->worst)) {
-        state->worst = found;
-        state->unfit_worst = frame->index;
-    }
+    frame->figures.fault = found.kind;
+    if (found.kind) count_unfit(state, frame->index, &found);
+    return npg_verdict_add(&state->verdict, frame);
 }
 
 static npg_status end_fusing(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
+    npg_late_faults late = {0};
+    NPG_TRY(find_late(worker, &late));
+    for (size_t i = 0; i < late.count; i++) {
+        const fault found = {late.faults[i].fault, late.faults[i].value, late.faults[i].bound};
+        count_unfit(state, late.faults[i].index, &found);
+    }
+    npg_release(&late.faults);
     *npg_own(worker, unfit_count) = state->unfit_count;
     *npg_own(worker, unfit_worst) = state->unfit_worst;
     return npg_topology_finish(&state->watch, worker);
@@ -356,7 +375,7 @@ static npg_status see_frame(npg_worker *worker, npg_frame *frame)
     if (is_judged)
         NPG_TRY(take_frame(worker, frame, true));
     else
-        note_unfit(worker, frame);
+        NPG_TRY(note_unfit(worker, frame));
     return npg_topology_add(&state->watch, worker, frame);
 }
 
@@ -410,7 +429,7 @@ static const npg_option options[] = {
         "or outside the outline of a body whose background was removed, each by itself, in per cent"),
     NPG_PART(REAL,          "bars.lost",        AT(lost_max),           "2",      0, 100,  "PERCENT",
         "most of its points that lie farther from the surface than depth images are sure of, three cells of "
-        "160 along an image, in per cent"),
+        "160 along an image, in per cent; without images half of that, of points that are missed in one place"),
     NPG_PART(REAL,          "bars.cover",       AT(measured.cover_dist), "1",      0, 100,  "PERCENT",
         "how near a point must be to cover the surface, in per cent of the diagonal"),
     NPG_KEY(INT,            "evaluate-points",  AT(measured.point_limit), "100000", 0, 1e12, NULL,

@@ -165,7 +165,8 @@ enum { FRAMES = 3, POINTS = 2000 };
 typedef struct scene {
     double gap[FRAMES];   /* points lie this far outside the unit sphere            */
     double share[FRAMES]; /* of the sphere from the north pole down that has points */
-    double lost[FRAMES];  /* of the points, those farthest south: 0.07 outside the sphere */
+    double lost[FRAMES];  /* of the points, those farthest south: `lost_dist` outside the sphere */
+    double lost_dist;
     double vert_scale[FRAMES];
     bool skipped[FRAMES], broken[FRAMES];
     bool is_made;  /* the reference, from the points of all frames: it says what they did not see */
@@ -179,7 +180,7 @@ typedef struct scene {
 
 static scene plain_scene(void)
 {
-    scene s = {0};
+    scene s = {.lost_dist = 0.07}; /* 2 % of the diagonal */
     for (int i = 0; i < FRAMES; i++) s.share[i] = s.vert_scale[i] = 1;
     return s;
 }
@@ -189,7 +190,7 @@ static void put_spiral(float *points, const scene *s, int64_t index)
 {
     for (int i = 0; i < POINTS; i++) {
         double z = 1 - 2 * s->share[index] * (i + 0.5) / POINTS, turn = i * pi * (3 - sqrt(5.0));
-        double lost = i >= (1 - s->lost[index]) * POINTS ? 0.07 : 0; /* 2 % of the diagonal */
+        double lost = i >= (1 - s->lost[index]) * POINTS ? s->lost_dist : 0;
         double radius = 1 + s->gap[index] + lost, flat = sqrt(1 - z * z);
         points[3 * i] = (float)(radius * flat * cos(turn));
         points[3 * i + 1] = (float)(radius * flat * sin(turn));
@@ -364,6 +365,23 @@ static void nearly_all_points_must_be_near(void **state)
     assert_int_equal(run_scene(&s, lenient), NPG_OK);
 }
 
+/* A hand: too few points for the bar on 95 % of them, and all of them in one place. */
+static void a_place_that_is_missed_is_a_fault(void **state)
+{
+    (void)state;
+    scene s = plain_scene();
+    s.lost_dist = 0.5;
+    s.lost[1] = 0.008;
+    s.lost[2] = 0.015;
+    assert_int_equal(run_scene(&s, NULL), NPG_PARTIAL);
+    assert_true(s.figures[1].good && s.figures[2].point_dist_p95 < 0.002);
+    assert_true(is_near(s.figures[2].misfits[NPG_MISFIT_FAR].share, 0.015, 1e-3));
+    assert_int_equal(s.figures[2].fault, NPG_FAULT_LOST);
+    assert_int_equal(s.bad_count, 1);
+    const char *const lenient[][2] = {{"bars.lost", "4"}, {NULL, NULL}};
+    assert_int_equal(run_scene(&s, lenient), NPG_OK);
+}
+
 static void coverage_is_the_share_with_points(void **state)
 {
     (void)state;
@@ -501,6 +519,7 @@ int main(void)
         cmocka_unit_test(distances_are_those_that_were_made),
         cmocka_unit_test(vertex_distances_agree_with_the_plain_way),
         cmocka_unit_test(nearly_all_points_must_be_near),
+        cmocka_unit_test(a_place_that_is_missed_is_a_fault),
         cmocka_unit_test(coverage_is_the_share_with_points),
         cmocka_unit_test(surface_without_support_is_measured_and_placed),
         cmocka_unit_test(what_another_frame_saw_has_support),
