@@ -37,8 +37,7 @@ typedef struct evaluate_state {
     npg_measure *measure; /* opened for the first frame that has a mesh */
     npg_verdict verdict;
     aggregate sums[NPG_FIGURE_ROWS];
-    int64_t *bad;                     /* numbers of the frames below the bar; owned */
-    int64_t unfit_count, unfit_worst; /* of a fusing pass */
+    int64_t *bad; /* numbers of the frames below the bar, in a fusing pass their indices; owned */
     size_t bad_count, bad_capacity, good_count, skipped_count;
     fault worst; /* of the bad ones, by how often it is the bar */
     int64_t worst_number;
@@ -174,6 +173,12 @@ static void warn_of_bad(npg_worker *worker, int64_t number, const fault *f, cons
                     f->value, f->bound, place);
 }
 
+/* What a frame is known by: of a fusing pass nobody is told but the reference's owner, who asks for places in time. */
+static int64_t name_of(const npg_worker *worker, int64_t number, int64_t index)
+{
+    return npg_worker_pass(worker) == NPG_PASS_FUSE ? index : number;
+}
+
 /* Of a frame that a resumed run restores, too: the same faults follow from the same figures. */
 static npg_status take_frame(npg_worker *worker, npg_frame *frame, bool is_new)
 {
@@ -187,7 +192,7 @@ static npg_status take_frame(npg_worker *worker, npg_frame *frame, bool is_new)
     state->good_count += frame->figures.good;
     state->skipped_count += frame->is_skipped;
     if (frame->is_skipped) return NPG_OK;
-    if (found.kind) NPG_TRY(note_bad(state, frame->number, &found));
+    if (found.kind) NPG_TRY(note_bad(state, name_of(worker, frame->number, frame->index), &found));
     if (found.kind && is_new) warn_of_bad(worker, frame->number, &found, frame->figures.unsupported_at);
     return npg_verdict_add(&state->verdict, frame);
 }
@@ -201,7 +206,14 @@ static npg_status find_late(npg_worker *worker, npg_late_faults *late)
         (npg_verdict_bars){state->coverage_min > 0 ? (1 - state->coverage_min / 100) / 2 : 1,
                            fmax(state->measured.cover_dist, state->residual_max) / 100,
                            state->residual_max / 100, npg_worker_facts(worker)->sensor_count_max > 0};
-    return npg_verdict_finish(&state->verdict, late);
+    NPG_TRY(npg_verdict_finish(&state->verdict, late));
+    for (size_t i = 0; i < late->count; i++) {
+        const struct npg_late_fault *one = &late->faults[i];
+        const fault found = {one->fault, one->value, one->bound};
+        NPG_TRY(note_bad(state, name_of(worker, one->number, one->index), &found));
+        if (npg_worker_pass(worker) == NPG_PASS_SOLVE) warn_of_bad(worker, one->number, &found, NULL);
+    }
+    return NPG_OK;
 }
 
 static npg_status judge_together(npg_worker *worker)
@@ -210,11 +222,6 @@ static npg_status judge_together(npg_worker *worker)
     npg_late_faults *late;
     NPG_TRY(npg_alloc(&late, NPG_FOR_RUN, sizeof *late));
     npg_status status = find_late(worker, late);
-    for (size_t i = 0; i < late->count && !status; i++) {
-        const fault found = {late->faults[i].fault, late->faults[i].value, late->faults[i].bound};
-        status = note_bad(state, late->faults[i].number, &found);
-        if (!status) warn_of_bad(worker, late->faults[i].number, &found, NULL);
-    }
     state->good_count -= late->count;
     npg_status published = npg_worker_publish(worker, &npg_fact_late_faults, late);
     return status ? status : published;
@@ -266,38 +273,15 @@ static void report_verdict(json_t *report, const evaluate_state *state, double u
     json_object_set_new(report, "verdict", json_string(text));
 }
 
-/* Of a fusing pass nobody is told but the reference's owner. */
-static void count_unfit(evaluate_state *state, int64_t index, const fault *found)
-{
-    if (!state->unfit_count++ || times_of(found) > times_of(&state->worst)) {
-        state->worst = *found;
-        state->unfit_worst = index;
-    }
-}
-
-static npg_status note_unfit(npg_worker *worker, npg_frame *frame)
-{
-    evaluate_state *state = npg_worker_state(worker);
-    if (frame->is_shared || frame->is_skipped || isnan(frame->figures.coverage)) return NPG_OK;
-    fault found = fault_of(state, &frame->figures, npg_worker_facts(worker)->unseen_share);
-    frame->figures.fault = found.kind;
-    if (found.kind) count_unfit(state, frame->index, &found);
-    return npg_verdict_add(&state->verdict, frame);
-}
-
 static npg_status end_fusing(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
     npg_late_faults late = {0};
-    NPG_TRY(find_late(worker, &late));
-    for (size_t i = 0; i < late.count; i++) {
-        const fault found = {late.faults[i].fault, late.faults[i].value, late.faults[i].bound};
-        count_unfit(state, late.faults[i].index, &found);
-    }
+    npg_status status = find_late(worker, &late);
     npg_release(&late.faults);
-    *npg_own(worker, unfit_count) = state->unfit_count;
-    *npg_own(worker, unfit_worst) = state->unfit_worst;
-    return npg_topology_finish(&state->watch, worker);
+    *npg_own(worker, unfit_count) = (int64_t)state->bad_count;
+    *npg_own(worker, unfit_worst) = state->worst_number;
+    return status ? status : npg_topology_finish(&state->watch, worker);
 }
 
 static npg_status flush(npg_worker *worker)
@@ -372,10 +356,7 @@ static npg_status see_frame(npg_worker *worker, npg_frame *frame)
     if (frame->vert_unit && (!is_judged || frame->fields & NPG_FIELD_VERTICES))
         NPG_TRY(measure_frame(worker, frame));
     if (is_judged) frame->fields |= NPG_FIELD_FIGURES;
-    if (is_judged)
-        NPG_TRY(take_frame(worker, frame, true));
-    else
-        NPG_TRY(note_unfit(worker, frame));
+    if (is_judged || !isnan(frame->figures.coverage)) NPG_TRY(take_frame(worker, frame, is_judged));
     return npg_topology_add(&state->watch, worker, frame);
 }
 
