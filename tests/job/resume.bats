@@ -4,7 +4,7 @@ load ../support/store
 
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6}' --faces 400
-    --keyframe 6 --bars residual=100,coverage=0,flipped=100 --quiet)
+    --keyframe 6 --bars residual=100,lost=100,coverage=0,flipped=100 --quiet)
 free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3}')
 grids=(--method '{"preset": "grids", "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 60}')
 
@@ -44,7 +44,7 @@ same() {
 @test "what sensors saw of the frames at hand is known when a killed run goes on" {
     "$NEUPIG" synth -o seen --rig --cameras 2 --frames 12 --cycles 0.2 --width 100 --height 80 >synth.log
     input=seen/rig/rig.json
-    local judged=(--bars residual=100,coverage=0,flipped=100,stretched=100,unsupported=100,invented=100,nowhere=100)
+    local judged=(--bars residual=100,lost=100,coverage=0,flipped=100,stretched=100,unsupported=100,invented=100,nowhere=100)
     kill_at seen-broken KILL 1 "${judged[@]}"
     [ ! -e seen-broken/done.json ]
     for out in seen-whole seen-broken; do

@@ -1,7 +1,7 @@
 # Live captures through the command: standard input and a folder that grows, longer than the look-ahead.
 
 small=(--method '{"epochs": 2, "poisson-depth": 6, "window": 4, "overlap": 1,
-                  "align-nodes": 60}' --faces 300 --quiet --bars residual=100,coverage=0,stretched=100,flipped=100
+                  "align-nodes": 60}' --faces 300 --quiet --bars residual=100,lost=100,coverage=0,stretched=100,flipped=100
        --look-ahead 6)
 
 setup_file() {

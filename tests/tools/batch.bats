@@ -207,7 +207,7 @@ setup() {
 CONFIG
     run "$NEUPIG" batch ama -o ama --list
     [ "$output" = $'crane\njump' ]
-    small=(--faces 200 --method '{"poisson-depth": 5}' --bars residual=100,flipped=100,stretched=100,coverage=0 --keyframe 1)
+    small=(--faces 200 --method '{"poisson-depth": 5}' --bars residual=100,lost=100,flipped=100,stretched=100,coverage=0 --keyframe 1)
     run "$NEUPIG" batch ama -o results --method fit.json "${small[@]}" --task-count 2
     [ "$status" -eq 2 ]
     [[ "$output" == *'fit.json: '*'tools/method_json.py'* ]]
