@@ -62,12 +62,12 @@ enum { NPG_MARKS = 8 };
  * (npg_frame_box). */
 typedef struct npg_figures {
     double point_dist_median, point_dist_mean, point_dist_p95; /* points -> surface */
-    double vertex_dist_mean; /* surface vertices in sight -> nearest point */
-    double coverage;         /* share of the surface area in sight with points near it, 0..1 */
-    double flipped_share;    /* faces turned over against their neighbourhood's rotation, share by area */
-    double stretched_share;  /* faces whose area is > 10 x or < 0.1 x that of the reference, by area */
-    double edge_change;      /* mean |length / reference length - 1| */
-    double chamfer;          /* 0.5 (mean d^2 points->surface + mean d^2 vertices->points), x 1e5 */
+    double vertex_dist_mean;                                   /* surface vertices -> nearest point */
+    double coverage;        /* share of the surface area in sight with points near it, 0..1 */
+    double flipped_share;   /* faces turned over against their neighbourhood's rotation, share by area */
+    double stretched_share; /* faces whose area is > 10 x or < 0.1 x that of the reference, by area */
+    double edge_change;     /* mean |length / reference length - 1| */
+    double chamfer;         /* 0.5 (mean d^2 points->surface + mean d^2 vertices->points), x 1e5 */
     /* Share of the area that no points are near, of this frame or of those that the reference was made from
      * (NaN without npg_mesh.vert_unseen); the middle of its largest part, world (NaN where there is none) */
     double unsupported_share, unsupported_at[3];

@@ -355,19 +355,17 @@ static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_f
     NPG_TRY(npg_points_nearest(m->nearest, m->dists, m->points, point_count, vert_unit, v, 1));
     double area = npg_vertex_areas(m->vert_areas, vert_unit, v, mesh->faces, mesh->face_count);
     double radius = cover_radius(m, area, point_count, per_unit), covered = 0, seen = 0, sum = 0, sum_sq = 0;
-    size_t in_sight = 0;
     if (frame->sensor_count) NPG_TRY(find_in_sight(m, frame, box, sqrt(area / (double)point_count)));
     for (size_t i = 0; i < v; i++) {
         double dist_sq = (double)m->dists[i];
         sum_sq += dist_sq;
-        if (frame->sensor_count && !m->is_in_sight[i]) continue;
-        in_sight++;
         sum += sqrt(dist_sq);
+        if (frame->sensor_count && !m->is_in_sight[i]) continue;
         seen += m->vert_areas[i];
         if (dist_sq <= radius * radius) covered += m->vert_areas[i];
     }
     figures->coverage = seen > 0 ? covered / seen : 0;
-    figures->vertex_dist_mean = in_sight ? sum / (double)in_sight * per_unit : 0;
+    figures->vertex_dist_mean = sum / (double)v * per_unit;
     *mean_sq = sum_sq / (double)v * per_unit * per_unit;
     NPG_TRY(measure_unsupported(m, figures, box, radius, area));
     NPG_TRY(measure_by_images(m, frame, box, point_count, area));
