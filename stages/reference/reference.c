@@ -128,7 +128,9 @@ static npg_status result_of(npg_pass_result *result, npg_worker *worker)
                                 .is_side = facts->sensor_count_max && edges.border_edges,
                                 .has_images = facts->view_count_max > 0};
     result->bad_count = facts->unfit_count + last - result->explained_to + result->explained_from;
-    if (facts->reference_key != facts->plan.key) result->bad_count = facts->planned_count; /* it has none */
+    /* It has no surface; or frames are counted twice, as below the bar and as not explained. */
+    if (facts->reference_key != facts->plan.key || result->bad_count > facts->planned_count)
+        result->bad_count = facts->planned_count;
     result->next = find_next(worker, result);
     NPG_TRY(is_beatable(&result->is_beatable, worker));
     result->is_beatable |= result->bad_count && facts->choice.is_tried;
