@@ -17,7 +17,7 @@ import neupig
 from neupig import _library
 
 WORK = pathlib.Path(sys.argv.pop(1))
-SMALL = dict(epochs=6, faces=600, poisson_depth=6, bars="residual=100,lost=100,coverage=0,flipped=100")
+SMALL = dict(epochs=6, faces=600, poisson_depth=6, bars="residual=100,coverage=0,flipped=100")
 
 
 def ball(frame, count=900):

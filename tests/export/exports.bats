@@ -2,7 +2,7 @@
 
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6}' --faces 400
-    --bars residual=100,lost=100,coverage=0,flipped=100 --quiet)
+    --bars residual=100,coverage=0,flipped=100 --quiet)
 forms=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "vdb-voxel": 0.04}' --export obj,ply,pc2,mdd,glb,glb-meshopt,vat,usda,npz,vdb --unit cm --up z --fps 24)
 
 setup_file() {

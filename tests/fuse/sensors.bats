@@ -1,7 +1,7 @@
 # Where sensors stood (option --sensor) says what is empty: a slot that they looked through is not closed.
 
 small=(--faces 2500 --method '{"poisson-depth": 6, "align-nodes": 60, "align-steps": 6}' --keyframe 3 --no-outliers --quiet
-    --bars unsupported=100,residual=100,lost=100,coverage=0,flipped=100,stretched=100,invented=100)
+    --bars unsupported=100,residual=100,coverage=0,flipped=100,stretched=100,invented=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"

@@ -3,7 +3,7 @@
 # standard input: input.bats; checkpoints, disks, jobs: resume.bats; sources that stop: live.bats.)
 
 small=(--method '{"epochs": 4, "poisson-depth": 6}' --faces 600 --quiet
-    --bars residual=100,lost=100,coverage=0,flipped=100,stretched=100)
+    --bars residual=100,coverage=0,flipped=100,stretched=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"

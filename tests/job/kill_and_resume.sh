@@ -19,7 +19,7 @@ if [ -z "$capture" ]; then
     "$neupig-bodies" --body bar --frames "$frames" --points 800 -o "$folder/capture" >"$folder/synth.log" || exit 1
     options=(--method '{"epochs": 12, "poisson-depth": 6, "window": 8, "overlap": 2,
                         "align-nodes": 60}' --faces 600
-    --bars residual=100,lost=100,coverage=0 "${options[@]}")
+    --bars residual=100,coverage=0 "${options[@]}")
 fi
 
 work() { # OUT

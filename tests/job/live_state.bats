@@ -4,7 +4,7 @@
 load ../support/store
 
 small=(--method '{"epochs": 2, "poisson-depth": 6, "align-nodes": 40,
-                  "align-steps": 6}' --faces 300 --quiet --bars residual=100,lost=100,coverage=0,stretched=100,flipped=100)
+                  "align-steps": 6}' --faces 300 --quiet --bars residual=100,coverage=0,stretched=100,flipped=100)
 open=(--method '{"window": 4, "overlap": 1}' --look-ahead 6 --follow-end 0)
 
 setup_file() {

@@ -44,7 +44,7 @@ same() {
 @test "what sensors saw of the frames at hand is known when a killed run goes on" {
     "$NEUPIG" synth -o seen --rig --cameras 2 --frames 12 --cycles 0.2 --width 100 --height 80 >synth.log
     input=seen/rig/rig.json
-    local judged=(--bars residual=100,lost=100,coverage=0,flipped=100,stretched=100,unsupported=100,invented=100,nowhere=100)
+    local judged=(--bars residual=100,coverage=0,flipped=100,stretched=100,unsupported=100,invented=100,nowhere=100)
     kill_at seen-broken KILL 1 "${judged[@]}"
     [ ! -e seen-broken/done.json ]
     for out in seen-whole seen-broken; do

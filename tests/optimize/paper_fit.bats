@@ -33,7 +33,7 @@ figure() { sed -n "s/.*\"$1\": \([0-9.e-]*\).*/\1/p" figures.json | head -n 1; }
 
 @test "eight frames, sixty epochs" {
     "$NEUPIG" synth --frames 8 --points 1500 --cycles 0.4 --cell 0.04 -o capture >synth.log
-    "$NEUPIG" run capture/points -o out --method '{"preset": "paper", "epochs": 60, "poisson-depth": 6}' --faces 1000 --bars residual=100,lost=100,coverage=0,flipped=100 --quiet
+    "$NEUPIG" run capture/points -o out --method '{"preset": "paper", "epochs": 60, "poisson-depth": 6}' --faces 1000 --bars residual=100,coverage=0,flipped=100 --quiet
     "$NEUPIG" eval out capture --samples 20000 --json >figures.json
     cat figures.json
     awk -v cd="$(figure CD)" -v corr="$(figure Corr)" 'BEGIN { exit !(cd > 0 && cd < 2.5 && corr > 0 && corr < 0.0178) }'
@@ -42,7 +42,7 @@ figure() { sed -n "s/.*\"$1\": \([0-9.e-]*\).*/\1/p" figures.json | head -n 1; }
 # It gave CD 1.46, Corr 0.0098; before windows began at the tracker's poses, new frames opened by the distance alone, CD 6.6, Corr 0.0219.
 @test "windows that share frames follow a walk" {
     "$NEUPIG" synth --frames 20 --points 1500 -o walk >synth.log
-    "$NEUPIG" run walk/points -o windows --faces 1000 --bars residual=100,lost=100,coverage=0,flipped=100 --quiet \
+    "$NEUPIG" run walk/points -o windows --faces 1000 --bars residual=100,coverage=0,flipped=100 --quiet \
         --method '{"preset": "paper", "window": 8, "overlap": 2, "poisson-depth": 6, "width-1": 128, "width-2": 128}'
     "$NEUPIG" eval windows walk --samples 20000 --json >figures.json
     cat figures.json

@@ -1,7 +1,7 @@
 # Windows against one joint window over the same short capture: as near the truth, and no seam between them.
 
 small=(--method '{"poisson-depth": 6, "align-nodes": 120}' --faces 1000
-    --bars residual=100,lost=100,coverage=0,flipped=100
+    --bars residual=100,coverage=0,flipped=100
     --export obj --quiet)
 
 setup_file() {

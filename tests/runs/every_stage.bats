@@ -3,7 +3,7 @@
 
 load ../support/store
 
-small=(--faces 500 --method '{"poisson-depth": 5, "align-nodes": 60, "align-steps": 5}' --bars residual=100,lost=100,coverage=0,flipped=100,stretched=100,unsupported=100,invented=100
+small=(--faces 500 --method '{"poisson-depth": 5, "align-nodes": 60, "align-steps": 5}' --bars residual=100,coverage=0,flipped=100,stretched=100,unsupported=100,invented=100
     --quiet)
 
 setup_file() {

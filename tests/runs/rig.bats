@@ -4,7 +4,7 @@
 load ../support/store
 
 small=(--faces 2000 --method '{"poisson-depth": 6, "align-nodes": 80, "align-steps": 6}' --quiet
-    --bars residual=100,lost=100,coverage=0,flipped=100,stretched=100)
+    --bars residual=100,coverage=0,flipped=100,stretched=100)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"

@@ -5,7 +5,7 @@ small=(--method '{"epochs": 8, "poisson-depth": 7}' --faces 800 --bars flipped=5
 setup_file() {
     cd "$BATS_FILE_TMPDIR"
     "$NEUPIG-bodies" --body bar --frames 5 --points 1200 -o capture >synth.log
-    "$NEUPIG" run capture/points -o first "${small[@]}" --bars residual=100,lost=100,coverage=0 >first.log
+    "$NEUPIG" run capture/points -o first "${small[@]}" --bars residual=100,coverage=0 >first.log
 }
 
 setup() {
@@ -63,7 +63,7 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
 @test "the keyframe of a mesh of one's own is the frame that it is nearest to, from files and live" {
     mesh=$(ls "$PWD"/capture/truth/* | sed -n 4p)
     own() { # from the end of its swing the bar is torn on its way to the other, which is said
-        "$NEUPIG" run "$@" "${small[@]}" --bars residual=100,lost=100,coverage=0 --reference "$mesh" || [ $? -eq 7 ]
+        "$NEUPIG" run "$@" "${small[@]}" --bars residual=100,coverage=0 --reference "$mesh" || [ $? -eq 7 ]
     }
     own capture/points -o own
     key_is own 3
@@ -90,8 +90,8 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
 }
 
 @test "frames on standard input give the same meshes as the files" {
-    "$NEUPIG" run capture/points -o from-files "${small[@]}" --bars residual=100,lost=100,coverage=0 >/dev/null
-    cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" --bars residual=100,lost=100,coverage=0 >/dev/null
+    "$NEUPIG" run capture/points -o from-files "${small[@]}" --bars residual=100,coverage=0 >/dev/null
+    cat capture/points/*.ply | "$NEUPIG" run - -o piped "${small[@]}" --bars residual=100,coverage=0 >/dev/null
     for mesh in from-files/meshes/*.ply; do
         cmp "$mesh" "piped/meshes/$(basename "$mesh")"
     done
@@ -115,7 +115,7 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
 @test "with keep-going a truncated frame is skipped, said, and the run ends with 7" {
     cp -r capture/points cut
     truncate -s 5000 cut/frame_0001.ply
-    run "$NEUPIG" run cut -o cut-out "${small[@]}" --bars residual=100,lost=100,coverage=0 --keep-going
+    run "$NEUPIG" run cut -o cut-out "${small[@]}" --bars residual=100,coverage=0 --keep-going
     echo "$output"
     [ "$status" -eq 7 ]
     [[ "$output" == *frame_0001.ply* ]]
@@ -191,7 +191,7 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
 
 @test "too little memory is 6; what the process has beside the limit is said" {
     run_bad 6 "memory limit of 4 MiB" capture/points --max-memory 4
-    run "$NEUPIG" run capture/points -o little "${small[@]}" --bars residual=100,lost=100,coverage=0 --max-memory 30 --no-quiet
+    run "$NEUPIG" run capture/points -o little "${small[@]}" --bars residual=100,coverage=0 --max-memory 30 --no-quiet
     [ "$status" -eq 0 ]
     [[ "$output" =~ "the process had "[0-9]+" MiB in memory, more than max-memory (30 MiB)" ]]
 }
@@ -204,7 +204,7 @@ assert json.load(open(sys.argv[1] + "/report.json"))["stages"]["keyframe"]["key"
     [ "$status" -eq 2 ]
     [[ "$output" == *"foreign/meshes/frame_0000.ply is not of this job"*overwrite* ]]
     [ "$(cat foreign/meshes/frame_0000.ply)" = mine ]
-    "$NEUPIG" run capture/points -o foreign "${small[@]}" --bars residual=100,lost=100,coverage=0 --overwrite >/dev/null
+    "$NEUPIG" run capture/points -o foreign "${small[@]}" --bars residual=100,coverage=0 --overwrite >/dev/null
 }
 
 @test "results of another numbering are not mixed in" {

@@ -3,7 +3,7 @@
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
     small=(--method '{"epochs": 2, "poisson-depth": 5}' --faces 300 --quiet
-        --bars residual=100,lost=100,coverage=0,flipped=100,stretched=100)
+        --bars residual=100,coverage=0,flipped=100,stretched=100)
 }
 
 # An ellipsoid that grows and turns, 3 frames of 700 points, all multiplied by UNIT.

@@ -5,7 +5,7 @@ setup_file() {
     "$NEUPIG-bodies" --body bar --frames 5 --points 1200 -o capture >synth.log
     "$NEUPIG" run capture/points -o job --keyframe 0 --method '{"reference-from": "key", "epochs": 8,
         "poisson-depth": 7}' --faces 800 \
-        --quiet --bars residual=100,lost=100,coverage=0 >job.log || [ $? -eq 7 ]
+        --quiet --bars residual=100,coverage=0 >job.log || [ $? -eq 7 ]
 }
 
 setup() {
@@ -97,7 +97,7 @@ fine_and_coarse() {
 between_run() {
     "$NEUPIG" run coarse -o "$1" --keyframe 4 --method '{"epochs": 20,
         "poisson-depth": 6, "window": 4, "overlap": 1}' --faces 1000 \
-        --quiet --bars residual=100,lost=100,coverage=0,flipped=100 "${@:2}" >"$1.log" || [ $? -eq 7 ]
+        --quiet --bars residual=100,coverage=0,flipped=100 "${@:2}" >"$1.log" || [ $? -eq 7 ]
 }
 
 # The midpoints of each two meshes of frames in $1 (made with two steps a frame), with the frames, in $2.

@@ -2,7 +2,7 @@
 
 small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6, "vdb-voxel": 0.04}' --faces 400
-    --bars residual=100,lost=100,coverage=0,flipped=100,stretched=100,unsupported=100 --unit cm --up z --fps 24 --quiet)
+    --bars residual=100,coverage=0,flipped=100,stretched=100,unsupported=100 --unit cm --up z --fps 24 --quiet)
 forms=obj,ply,pc2,mdd,glb,glb-meshopt,vat,usda,npz,vdb
 
 setup_file() {

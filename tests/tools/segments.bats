@@ -2,7 +2,7 @@
 
 small=(--method '{"epochs": 10, "poisson-depth": 6, "window": 10, "overlap": 2,
                   "align-nodes": 300, "align-steps": 8, "segment-min": 4}' --faces 2000
-    --bars residual=100,lost=100,flipped=100,coverage=0
+    --bars residual=100,flipped=100,coverage=0
     --effort quick # one reference and one keyframe: what segments add is the same; "usual" where a test asks for it
     --quiet)
 
