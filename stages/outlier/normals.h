@@ -28,8 +28,7 @@ void npg_normals_face_sensor(float *normals, size_t *flipped, const float *point
  * (sheets.c): winding.c has the formula.  given (N x 3, unit, some on the wrong side): where to begin, and then what
  * is open faces to its convex sides; or NULL.  Of large clouds an even choice of points makes the field, and the
  * normals of all are read from it, as coarse as those points are: npg_winding_is_whole() says whether all took
- * part.  A point without any direction keeps what normals has.  N >= 1.  The time goes with N log N
- * (winding_sums.h).  NPG_MEMORY. */
+ * part.  A point without any direction keeps what normals has.  N >= 1.  The time goes with N log N (winding_sums.h).  NPG_MEMORY. */
 npg_status npg_winding_normals(float *normals, const float *points, const float *given, size_t point_count);
 bool npg_winding_is_whole(size_t point_count);
 size_t npg_winding_memory(size_t point_count); /* bytes at most */
