@@ -77,6 +77,8 @@ typedef struct npg_brief {
     bool takes_poses;    /* ... and the poses found are good to start from; else frames are followed anew */
     int64_t gathers_from, gathers_to; /* index of the first and last frame whose points are gathered */
     bool is_last_look; /* the pass is walked for what frames contradict of what was gathered last, no more */
+    bool is_best;      /* no reference of this keyframe did better than the one followed: it is kept ... */
+    bool takes_back;   /* ... and the next one is what was kept: those after it did worse */
     bool trims_only;   /* the next reference is the one so far, without what the frames followed contradict */
     bool is_side;      /* the reference is a side of the body, of which sensors see a part in a frame */
     bool leaves_open;  /* the next reference has what one frame saw, and is not closed over what none did */
@@ -124,6 +126,7 @@ typedef struct npg_facts {
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */
     int64_t unfit_count;   /* of a fusing pass: frames below the bar ...                  */
+    int64_t unfit_within;  /* ... those of them that the reference explains ...          */
     int64_t unfit_worst;   /* ... and the index of the one that is farthest below it     */
     /* job, before the first pass */
     bool is_resumed;       /* all facts above are known; only the solving pass is walked */

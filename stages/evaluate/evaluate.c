@@ -276,12 +276,19 @@ static void report_verdict(json_t *report, const evaluate_state *state, double u
 static npg_status end_fusing(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
     npg_late_faults late = {0};
+    int64_t within = 0;
     npg_status status = find_late(worker, &late);
     npg_release(&late.faults);
+    if (!status) status = npg_topology_finish(&state->watch, worker);
+    for (size_t i = 0; i < state->bad_count; i++)
+        within += (!facts->has_changed[0] || state->bad[i] < facts->changed_at[0]) &&
+                  (!facts->has_changed[1] || state->bad[i] > facts->changed_at[1]);
     *npg_own(worker, unfit_count) = (int64_t)state->bad_count;
+    *npg_own(worker, unfit_within) = within;
     *npg_own(worker, unfit_worst) = state->worst_number;
-    return status ? status : npg_topology_finish(&state->watch, worker);
+    return status;
 }
 
 static npg_status flush(npg_worker *worker)

@@ -329,14 +329,17 @@ static npg_status compare(bool *is_worse, making *m, const npg_candidate_clouds 
 }
 
 /* What all frames saw mostly makes the better reference; where points that took no part say otherwise, the
- * one before stays.  One that was open is no rival: it lacks what the next one has. */
+ * one before stays.  Sides of a body are told by all frames that are followed with them (reference/loop.h): a sample
+ * is too far apart for limbs that swing. */
 static npg_status take_back_if_worse(making *m)
 {
     const npg_facts *facts = npg_worker_facts(m->worker);
     const npg_candidate_clouds *clouds = npg_worker_fact(m->worker, &npg_fact_candidate_clouds);
     npg_mesh *before = facts->reference;
     bool is_worse = false;
-    if (!m->fused || !before || !clouds || facts->brief.was_open || !facts->brief.takes_poses) return NPG_OK;
+    if (!m->fused || !before || !clouds || facts->brief.was_open || facts->brief.is_side ||
+        !facts->brief.takes_poses)
+        return NPG_OK;
     npg_status status = compare(&is_worse, m, clouds, before);
     if (status != NPG_DIVERGED) NPG_TRY(status);
     json_object_set_new(npg_worker_report(m->worker), "taken_back", json_boolean(is_worse));
@@ -379,6 +382,34 @@ static npg_status try_larger_cells(making *m)
     return status == NPG_DIVERGED || status == NPG_FAILED ? NPG_OK : status;
 }
 
+/* ---- the best side so far ---- */
+
+static npg_mesh **best_side(const npg_worker *worker)
+{
+    return npg_worker_kept(worker);
+}
+
+static void release_best(void *thing)
+{
+    npg_mesh **best = thing;
+    npg_mesh_unref(best);
+    npg_release(&best);
+}
+
+static npg_status mesh_settle(npg_worker *worker)
+{
+    const npg_facts *facts = npg_worker_facts(worker);
+    npg_mesh **best = best_side(worker);
+    if (npg_worker_pass(worker) != NPG_PASS_FUSE || !facts->brief.is_best) return NPG_OK;
+    if (!best) {
+        NPG_TRY(npg_alloc(&best, NPG_FOR_MESH, sizeof *best));
+        npg_worker_keep(worker, best, release_best);
+    }
+    npg_mesh_unref(best);
+    *best = npg_mesh_ref(facts->reference);
+    return NPG_OK;
+}
+
 /* ---- one reference ---- */
 
 /* The points and normals of fused (or NULL) are taken from it. */
@@ -386,16 +417,21 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
 {
     making m = {.worker = worker, .state = npg_worker_state(worker), .key = key, .fused = fused};
     bool is_given = npg_worker_settings(worker)->reference[0];
+    bool takes_back = npg_worker_facts(worker)->brief.takes_back;
     bool trims = fused && fused->empty && npg_worker_facts(worker)->brief.trims_only;
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
-    if (!status) status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);
+    if (!status && takes_back)
+        m.mesh = npg_mesh_ref(*best_side(worker));
+    else if (!status)
+        status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);
     if (!status) status = measure_reference(&m);
-    if (!status && !trims) status = try_larger_cells(&m);
-    if (!status && !trims) status = take_back_if_worse(&m);
+    if (!status && !trims && !takes_back) status = try_larger_cells(&m);
+    if (!status && !trims && !takes_back) status = take_back_if_worse(&m);
     if (!status) status = close_over(&m);
-    if (!status) status = judge_invented(&m);
-    if (!status) status = colour_reference(&m);
+    if (!status && !takes_back)
+        status = judge_invented(&m); /* what is taken back has its marks and colours */
+    if (!status && !takes_back) status = colour_reference(&m);
     npg_mesh_note(worker, "seconds", npg_clock_s() - since);
     npg_point_set_close(&m.set);
     if (!status) {
@@ -496,6 +532,7 @@ const npg_stage npg_stage_mesh = {.name = "mesh",
                                   .needs = NPG_FIELD_CLEAN | NPG_FIELD_KEY,
                                   .gives = NPG_FIELD_REFERENCE,
                                   .process = mesh_process,
+                                  .settle = mesh_settle,
                                   .memory = mesh_memory,
                                   .verts_at_most = verts_at_most,
                                   .expects = mesh_expects};
