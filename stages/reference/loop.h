@@ -3,8 +3,7 @@
  *
  * The first pass is a trial of the keyframe.  Where frames fail with it, one that fails is tried as the keyframe:
  * what touches in one frame is joined in its surface, and is not in the surface of a frame where it parts.  The
- * keyframe with the fewest failures is kept, with what was gathered for it.  A reference that is one side of the
- * body lacks things that growth adds: there keyframes are compared by what they have grown to.
+ * keyframe with the fewest failures is kept, with what was gathered for it.
  *
  * One owner decides it all: how many passes there are, whether a reference that is one side of the body grows,
  * what is asked of frames that it is to reach, and whether what was gathered makes the next reference.  The
@@ -25,7 +24,6 @@ typedef struct npg_pass_result {
     bool has_changed;        /* it does not explain the capture to both its ends ...    */
     int64_t explained_from, explained_to; /* ... but from and to the frames of these indices */
     int64_t next;                         /* the keyframe to try where it fails; -1: none */
-    bool has_no_surface;                  /* none could be made of it: the one before was followed   */
     bool is_side;     /* it is a side of the body: what it lacks says nothing of how that is joined */
     bool has_images;  /* frames can contradict it */
     bool is_beatable; /* another keyframe's reference could do better */
@@ -38,18 +36,16 @@ typedef struct npg_reference_loop {
     npg_brief brief;                              /* the last one given */
     npg_pass_result tried[NPG_ATTEMPTS_MOST + 1]; /* what each keyframe came to ...        */
     size_t tried_count, kept;                     /* ... and which is the best so far */
-    int64_t rounds;                               /* that each keyframe has, at least */
     size_t attempts;                              /* that may be made after the first */
-    bool is_settled;          /* the keyframe is no longer in question, or only when its side has grown */
-    bool is_taken_back;       /* a side before the last one was the best, and grows once more */
-    bool is_compared;         /* it was chosen among candidates ...    */
-    npg_pass_result trial;    /* ... after the pass that came to this  */
-    int64_t grown;            /* passes that a side of the body has grown through   */
-    int64_t unreached_before; /* of the pass before ...                             */
-    int64_t in_vain;          /* ... and passes in a row that reached no more since */
-    bool is_limited;          /* the pass to come is for what it explains alone     */
-    int64_t walked;           /* passes with a side of the keyframe ...             */
-    int64_t bad_before, bad_least; /* ... and what failed in the last and the best one   */
+    bool is_settled;                              /* the keyframe is no longer in question */
+    bool is_compared;                             /* it was chosen among candidates ...    */
+    npg_pass_result trial;                        /* ... after the pass that came to this  */
+    int64_t grown;                                /* passes that a side of the body has grown through   */
+    int64_t unreached_before;                     /* of the pass before ...                             */
+    int64_t in_vain;                              /* ... and passes in a row that reached no more since */
+    bool is_limited;                              /* the pass to come is for what it explains alone     */
+    int64_t walked;                               /* passes with a side of the keyframe ...             */
+    int64_t bad_least;                            /* ... and the fewest frames that failed in one        */
 } npg_reference_loop;
 
 /* The brief of the first pass, of `rounds` that are to gather points, with so many attempts with other keyframes
