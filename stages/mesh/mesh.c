@@ -419,6 +419,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     bool is_given = npg_worker_settings(worker)->reference[0];
     bool takes_back = npg_worker_facts(worker)->brief.takes_back;
     bool trims = fused && fused->empty && npg_worker_facts(worker)->brief.trims_only;
+    bool is_new = !trims && !takes_back;
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
     if (!status && takes_back)
@@ -426,8 +427,8 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     else if (!status)
         status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);
     if (!status) status = measure_reference(&m);
-    if (!status && !trims && !takes_back) status = try_larger_cells(&m);
-    if (!status && !trims && !takes_back) status = take_back_if_worse(&m);
+    if (!status && is_new) status = try_larger_cells(&m);
+    if (!status && is_new) status = take_back_if_worse(&m);
     if (!status) status = close_over(&m);
     if (!status && !takes_back)
         status = judge_invented(&m); /* what is taken back has its marks and colours */

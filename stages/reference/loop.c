@@ -13,6 +13,7 @@
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t attempts)
 {
     *loop = (npg_reference_loop){.attempts = attempts,
+                                 .bad_least = INT64_MAX,
                                  .brief = {.rounds_left = rounds,
                                            .key = -1,
                                            .takes_gathered = true,
@@ -94,10 +95,9 @@ static const npg_pass_result *settle_key(npg_reference_loop *loop)
  * still some.  The best is the last that has hardly more than any: brief.is_best. */
 static bool has_gained(npg_reference_loop *loop, const npg_pass_result *result)
 {
-    bool is_first = !loop->walked++;
-    bool gains = !is_first && is_more(result, loop->bad_least, result->bad_count);
-    loop->brief.is_best = is_first || !is_more(result, result->bad_count, loop->bad_least);
-    if (is_first || result->bad_count < loop->bad_least) loop->bad_least = result->bad_count;
+    bool gains = is_more(result, loop->bad_least, result->bad_count);
+    loop->brief.is_best = !is_more(result, result->bad_count, loop->bad_least);
+    if (result->bad_count < loop->bad_least) loop->bad_least = result->bad_count;
     return gains && is_more(result, result->bad_count, 0);
 }
 

@@ -44,8 +44,7 @@ typedef struct npg_reference_loop {
     int64_t unreached_before;                     /* of the pass before ...                             */
     int64_t in_vain;                              /* ... and passes in a row that reached no more since */
     bool is_limited;                              /* the pass to come is for what it explains alone     */
-    int64_t walked;                               /* passes with a side of the keyframe ...             */
-    int64_t bad_least;                            /* ... and the fewest frames that failed in one        */
+    int64_t bad_least;                            /* the fewest frames that failed in a pass with a side */
 } npg_reference_loop;
 
 /* The brief of the first pass, of `rounds` that are to gather points, with so many attempts with other keyframes
