@@ -43,6 +43,7 @@ typedef struct state {
     npg_skin *skin;
     npg_cells *cells;
     npg_carving *empty;        /* NULL: it is not known where sensors stood */
+    npg_free_space *key_space; /* what the keyframe's images say; NULL: it has none */
     npg_colour_cells *colours; /* NULL: the points have no colours, or none are wanted */
     int64_t key;               /* index of the keyframe */
     double spacing, noise;     /* of the keyframe's points */
@@ -95,6 +96,13 @@ static unsigned colour_weight(int64_t away)
     return weight > 1 ? (unsigned)lrint(weight) : 1;
 }
 
+/* The reference lies as the keyframe shows the body, whatever the other frames' motion says: what was carried to a
+ * place where the keyframe saw that nothing is, was carried wrongly, and would be a limb for the second time. */
+static bool is_contradicted(const state *s, const npg_skinned *p)
+{
+    return npg_free_space_is_empty(s->key_space, p->point);
+}
+
 /* Weights fall with the distance as the tracker's do (Geman and McClure); what is near is averaged where the
  * surface is, so that noise across the surface averages out; what is not, where it is. */
 static npg_status add_points(state *s, const cloud *c, int64_t frame, double near_dist, double far_dist)
@@ -104,6 +112,10 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
         const npg_skinned *p = &c->warped[i];
         bool is_near = (double)p->dist <= near_dist;
         double share = (double)p->dist / near_dist, robust = 1 / (1 + share * share);
+        if (is_contradicted(s, p)) {
+            s->strays++;
+            continue;
+        }
         if (p->is_beyond && (double)p->dist <= s->grow_dist) {
             NPG_TRY(npg_cells_add(s->cells, p->point, p->normal, p->point, p->normal, GROW_WEIGHT, frame));
             continue;
@@ -157,13 +169,14 @@ static size_t most_cells(const npg_facts *facts)
     return points < NPG_FUSED_MOST ? points : NPG_FUSED_MOST;
 }
 
-static npg_status open_gathering(npg_worker *worker, const cloud *key)
+static npg_status open_gathering(npg_worker *worker, const cloud *key, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     s->key = facts->plan.key;
     NPG_TRY(npg_cloud_spacing(&s->spacing, key->points, key->count));
     NPG_TRY(npg_cloud_noise(&s->noise, key->points, key->normals, key->count));
+    NPG_TRY(npg_free_space_open(&s->key_space, frame, &facts->box));
     double side = fmax(SIDE_LEAST, 1 / sqrt((double)facts->planned_count)); /* for a point of all frames */
     NPG_TRY(npg_cells_open(&s->cells, side * s->spacing, most_cells(facts)));
     NPG_TRY(npg_skin_open(&s->skin, facts->reference));
@@ -178,7 +191,7 @@ static npg_status gather(npg_worker *worker, cloud *c, const npg_frame *frame)
     state *s = npg_worker_state(worker);
     double median;
     NPG_TRY(open_cloud(c, worker, frame));
-    if (!s->skin) NPG_TRY(open_gathering(worker, c));
+    if (!s->skin) NPG_TRY(open_gathering(worker, c, frame));
     if (c->colours && !s->colours) NPG_TRY(npg_colour_cells_open(&s->colours, s->spacing, COLOURS_MOST));
     npg_skin_pose(s->skin, frame->vert_unit);
     NPG_TRY(npg_skin_to_rest(s->skin, c->warped, c->points, c->normals, c->count));
@@ -324,6 +337,7 @@ static void uninit(npg_worker *worker)
     npg_skin_close(&s->skin);
     npg_cells_close(&s->cells);
     npg_carving_close(&s->empty);
+    npg_free_space_close(&s->key_space);
     npg_colour_cells_close(&s->colours);
 }
 
@@ -337,7 +351,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t empty = facts->sensor_count_max ? npg_carving_memory(EMPTY_MOST) : 0;
     return empty + colours + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
            npg_skin_memory(npg_worker_verts_at_most(worker), points) +
-           npg_free_space_memory(facts->view_count_max);
+           2 * npg_free_space_memory(facts->view_count_max);
 }
 
 const npg_stage npg_stage_fuse = {.name = "fuse",
