@@ -346,6 +346,7 @@ static npg_status init(npg_worker *worker)
 {
     evaluate_state *state = npg_worker_state(worker);
     const char *unseen = npg_options_get(npg_worker_options(worker), "unseen");
+    state->measured.lies_as_key = !npg_worker_settings(worker)->reference[0];
     /* A back that nobody saw was asked for. */
     if (unseen && !strcmp(unseen, "close")) state->unsupported_max = 100;
     if (npg_worker_pass(worker) == NPG_PASS_FUSE) return NPG_OK;

@@ -84,6 +84,7 @@ typedef struct npg_measure npg_measure;
 typedef struct npg_measure_settings {
     double cover_dist;   /* a point that near covers the surface, in per cent of the diagonal */
     int64_t point_limit; /* points of a frame that are asked for at most; 0: all               */
+    bool lies_as_key;    /* the reference lies as the keyframe shows the body                  */
 } npg_measure_settings;
 
 /* The mesh is a loan that must outlive the measure.  unseen_share: of its area that no point of its frame saw,
@@ -103,6 +104,8 @@ void npg_measure_close(npg_measure **measure);
  *                      max(cover_dist, 2 x spacing of the points)
  *   unsupported_*      share and largest place of what neither the reference's points nor these support
  *   misfits            as npg_misfit_find(), in world coordinates
+ *   nowhere_share      of the area, where depth images show that nothing is; of the keyframe of a reference that
+ *                      lies as it, also as it lies
  *
  * What is not known stays as it is.  One thread at a time.  NPG_MEMORY. */
 npg_status npg_measure_frame(npg_measure *measure, npg_frame *frame, const npg_frame_box *box);

@@ -323,21 +323,32 @@ static npg_status find_in_sight(npg_measure *m, const npg_frame *frame, const np
                             m->vert_unit, NULL, m->normals, mesh->vert_count, spacing);
 }
 
-/* What depth images say: of the area, before what they show or outside of its outline, whichever is more, and of
- * the points. */
+/* Of the area where the images show that nothing is, before what they show or outside of its outline, whichever is more,
+ * in places of the vertices. */
+static double nowhere_share(const npg_measure *m, const npg_free_space *space, const float *places,
+                            double whole)
+{
+    double before = 0, beside = 0;
+    for (size_t i = 0; i < m->proxy->mesh->vert_count; i++) {
+        npg_sight_kind kind = npg_free_space_look(space, places + 3 * i);
+        before += kind == NPG_SEEN_EMPTY ? m->vert_areas[i] : 0;
+        beside += kind == NPG_SEEN_BESIDE ? m->vert_areas[i] : 0;
+    }
+    return whole > 0 ? fmax(before, beside) / whole : 0;
+}
+
+/* What depth images say of the surface, and of the points.  The reference lies as the keyframe shows the body: what
+ * the keyframe sees through there is a limb for the second time, wherever it hides in other frames. */
 static npg_status measure_by_images(const npg_measure *m, npg_frame *frame, const npg_frame_box *box,
                                     size_t point_count, double whole)
 {
     npg_free_space *space;
-    double before = 0, beside = 0;
     NPG_TRY(npg_free_space_open(&space, frame, box));
     if (!space) return NPG_OK;
-    for (size_t i = 0; i < m->proxy->mesh->vert_count; i++) {
-        npg_sight_kind kind = npg_free_space_look(space, m->vert_unit + 3 * i);
-        before += kind == NPG_SEEN_EMPTY ? m->vert_areas[i] : 0;
-        beside += kind == NPG_SEEN_BESIDE ? m->vert_areas[i] : 0;
-    }
-    frame->figures.nowhere_share = whole > 0 ? fmax(before, beside) / whole : 0;
+    double share = nowhere_share(m, space, m->vert_unit, whole);
+    if (frame->is_key && m->settings.lies_as_key)
+        share = fmax(share, nowhere_share(m, space, m->proxy->mesh->vert_pos, whole));
+    frame->figures.nowhere_share = share;
     frame->figures.lost_share = npg_free_space_lost_share(space, m->points, m->hits, point_count);
     npg_free_space_close(&space);
     return NPG_OK;

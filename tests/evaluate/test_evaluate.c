@@ -448,6 +448,56 @@ static void a_frames_own_points_support(void **state)
     assert_true(s.figures[1].unsupported_share == 0 && s.figures[1].good);
 }
 
+/* A reference that its own frame contradicts, though it is moved to where all is right: a sphere that lies beside what the
+ * sensor of the keyframe sees. */
+static double nowhere_of(float shift, bool is_key, bool lies_as_key)
+{
+    enum { SIDE = 100 };
+    static float cells[SIDE * SIDE], points[3 * VERTS];
+    const npg_frame_box box = {.scale = 1, .diagonal = 1};
+    const npg_measure_settings settings = {.cover_dist = 1, .lies_as_key = lies_as_key};
+    npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 9},
+                           .first = {-0.5, -0.5},
+                           .step = 0.01,
+                           .width = SIDE,
+                           .height = SIDE};
+    float sensor[3] = {0, 0, -9};
+    npg_mesh *mesh;
+    npg_measure *measure;
+    assert_int_equal(open_sphere(&mesh), NPG_OK);
+    memcpy(points, mesh->vert_pos, sizeof points);
+    for (size_t v = 0; v < VERTS; v++) mesh->vert_pos[3 * v] += shift;
+    for (int i = 0; i < SIDE * SIDE; i++) { /* the sphere's outline, at least */
+        int x = i % SIDE - SIDE / 2, y = i / SIDE - SIDE / 2;
+        cells[i] = x * x + y * y < 13 * 13 ? 8 : INFINITY;
+    }
+    npg_frame frame = {.is_key = is_key,
+                       .pos_local = points,
+                       .point_count = VERTS,
+                       .vert_unit = points,
+                       .vert_count = VERTS,
+                       .sensor_local = sensor,
+                       .sensor_count = 1,
+                       .views = &view,
+                       .view_cells = cells,
+                       .view_cell_count = SIDE * SIDE};
+    assert_int_equal(npg_mesh_make_normals(mesh), NPG_OK);
+    assert_int_equal(npg_measure_open(&measure, mesh, 0, &settings), NPG_OK);
+    assert_int_equal(npg_measure_frame(measure, &frame, &box), NPG_OK);
+    npg_measure_close(&measure);
+    npg_mesh_unref(&mesh);
+    return frame.figures.nowhere_share;
+}
+
+static void the_keyframe_contradicts_what_lies_elsewhere(void **state)
+{
+    (void)state;
+    assert_true(nowhere_of(0, true, true) == 0);
+    assert_true(nowhere_of(1, true, true) > 0.2);
+    assert_true(nowhere_of(1, false, true) == 0); /* of another frame the pose counts alone */
+    assert_true(nowhere_of(1, true, false) == 0); /* and of a mesh that was given, too */
+}
+
 static void bad_frames_make_a_partial_run(void **state)
 {
     (void)state;
@@ -524,6 +574,7 @@ int main(void)
         cmocka_unit_test(surface_without_support_is_measured_and_placed),
         cmocka_unit_test(what_another_frame_saw_has_support),
         cmocka_unit_test(a_frames_own_points_support),
+        cmocka_unit_test(the_keyframe_contradicts_what_lies_elsewhere),
         cmocka_unit_test(bad_frames_make_a_partial_run),
         cmocka_unit_test(fewer_points_give_nearly_the_same),
         cmocka_unit_test(a_vertex_that_is_not_finite_is_a_failure),
