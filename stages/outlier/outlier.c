@@ -44,7 +44,8 @@ static const npg_option outlier_options[] = {
     /* type         name             place              default   least most  shown as or words */
     NPG_ROW_FLAG(   "outliers",      AT(drop_isolated), "yes",
         "Keep isolated points. Without it they are dropped by the statistical filter that PCL has, too, "
-        "repeated until it finds no more"),
+        "repeated until it finds no more; but not those of depth images, which are told by the pixels beside "
+        "them"),
     NPG_KEY(REAL,   "outlier-ratio", AT(ratio),         "5",      0.5,  100, NULL,
         "Standard deviations above the mean at which a point is isolated"),
     NPG_KEY(INT,    "points-max",    AT(point_max),     "0",      0,    4e9, NULL,
@@ -325,6 +326,8 @@ static npg_status check_frame_and_normals(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
+/* Points of depth images are told from mixed pixels by those beside them in the image (ingest/rig/depth_points.c): in
+ * space the few of a hand that reaches to the sensor lie apart, too. */
 static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
 {
     const outlier_state *s = npg_worker_state(worker);
@@ -332,8 +335,10 @@ static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
     npg_frame **frames;
     if (!s->drop_isolated) return NPG_OK;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FRAMES, frame_count + 1, sizeof *frames));
-    for (size_t i = 0; i < frame_count; i++)
-        if (!is_done(npg_chunk_frame(chunk, i))) frames[count++] = npg_chunk_frame(chunk, i);
+    for (size_t i = 0; i < frame_count; i++) {
+        npg_frame *frame = npg_chunk_frame(chunk, i);
+        if (!is_done(frame) && !frame->views) frames[count++] = frame;
+    }
     npg_status status = npg_isolated_drop(frames, count, NPG_NEIGHBOURS, s->ratio);
     npg_release(&frames);
     return status;
