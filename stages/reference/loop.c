@@ -10,18 +10,19 @@
  * more frames. */
 #define EXPLAINED_STEP 0.1
 
+static const npg_brief first_brief = {.key = -1,
+                                      .takes_gathered = true,
+                                      .keeps_gathered = true,
+                                      .takes_poses = true,
+                                      .gathers_from = INT64_MIN,
+                                      .gathers_to = INT64_MAX,
+                                      .explained_least = NPG_MOST};
+
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t attempts)
 {
-    *loop = (npg_reference_loop){.attempts = attempts,
-                                 .bad_least = INT64_MAX,
-                                 .brief = {.rounds_left = rounds,
-                                           .key = -1,
-                                           .takes_gathered = true,
-                                           .keeps_gathered = true,
-                                           .takes_poses = true,
-                                           .gathers_from = INT64_MIN,
-                                           .gathers_to = INT64_MAX,
-                                           .explained_least = NPG_MOST}};
+    *loop = (npg_reference_loop){
+        .rounds = rounds, .attempts = attempts, .bad_least = INT64_MAX, .brief = first_brief};
+    loop->brief.rounds_left = rounds;
     return loop->brief;
 }
 
@@ -59,18 +60,31 @@ static bool was_tried(const npg_reference_loop *loop, int64_t key)
     return i < loop->tried_count;
 }
 
+/* Count what the keyframe of the pass that ended came to; its last word is the one that counts. */
+static void note(npg_reference_loop *loop, const npg_pass_result *result)
+{
+    bool is_known = loop->tried_count && loop->tried[loop->tried_count - 1].key == result->key;
+    loop->tried[is_known ? loop->tried_count - 1 : loop->tried_count++] = *result;
+    loop->kept = 0;
+    for (size_t i = 1; i < loop->tried_count; i++)
+        if (loop->tried[i].bad_count < loop->tried[loop->kept].bad_count) loop->kept = i;
+}
+
+/* Of those counted none is without fault, and one is left that may be. */
+static bool may_try(const npg_reference_loop *loop, int64_t next)
+{
+    return loop->tried[loop->kept].bad_count && loop->tried_count <= loop->attempts && next >= 0 &&
+           !was_tried(loop, next);
+}
+
 /* Whether another keyframe is to be followed before anything is made of the pass that ended.  A side of the body
- * fails by what it lacks, which growth adds. */
+ * fails by what it lacks, which growth adds: it is compared in the end. */
 static bool tries_another(npg_reference_loop *loop, const npg_pass_result *result)
 {
     npg_brief *brief = &loop->brief;
-    size_t at = loop->tried_count;
     if (loop->is_settled) return false;
-    loop->tried[loop->tried_count++] = *result;
-    if (result->bad_count < loop->tried[loop->kept].bad_count) loop->kept = at;
-    bool is_open = result->is_side || result->unreached_count;
-    if (is_open || !loop->tried[loop->kept].bad_count || at == loop->attempts) return false;
-    if (result->next < 0 || was_tried(loop, result->next)) return false;
+    note(loop, result);
+    if (result->is_side || result->unreached_count || !may_try(loop, result->next)) return false;
     brief->key = result->next;
     brief->is_attempt = true;
     brief->keeps_gathered = keeps_last(loop);
@@ -87,6 +101,35 @@ static const npg_pass_result *settle_key(npg_reference_loop *loop)
     loop->brief.is_attempt = false;
     loop->brief.takes_poses = loop->brief.keeps_gathered = keeps_last(loop);
     return kept;
+}
+
+/* ---- a side that has grown ---- */
+
+/* Of the keyframe all is walked again from its own surface. */
+static void begin_with(npg_reference_loop *loop, int64_t key)
+{
+    loop->brief = first_brief;
+    loop->brief.rounds_left = loop->rounds;
+    loop->brief.key = key;
+    loop->brief.is_attempt = true;
+    loop->brief.takes_gathered = loop->brief.takes_poses = false;
+    loop->grown = loop->unreached_before = loop->in_vain = 0;
+    loop->bad_least = INT64_MAX;
+    loop->is_limited = false;
+}
+
+/* The last pass of a keyframe whose surface is a side of the body has ended.  Where most frames are not good it lacks
+ * what no growth gave it, and another keyframe, that shows what fails, is grown in its place.  The one that fails least
+ * is taken in the end: where it is one before, its passes are walked once more (their poses lie in the job's store). */
+static void compare_grown(npg_reference_loop *loop, const npg_pass_result *result)
+{
+    if (loop->is_taken_back) return;
+    note(loop, result);
+    int64_t good = result->frame_count - loop->tried[loop->kept].bad_count;
+    bool tries = may_try(loop, result->next) && (double)good < NPG_MOST * (double)result->frame_count;
+    if (!tries && keeps_last(loop)) return;
+    loop->is_taken_back = !tries;
+    begin_with(loop, tries ? result->next : loop->tried[loop->kept].key);
 }
 
 /* ---- what comes next ---- */
@@ -157,10 +200,12 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
     brief->takes_poses = brief->keeps_gathered = true;
     if (tries_another(loop, result)) return *brief;
     if (!loop->is_settled) result = settle_key(loop);
+    brief->is_attempt = false;
     if (brief->takes_back)
         end_taken_back(brief);
-    else
+    else if (!result->has_no_surface)
         go_on(loop, result);
+    if (result->is_side && (!brief->rounds_left || result->has_no_surface)) compare_grown(loop, result);
     return *brief;
 }
 

@@ -3,7 +3,8 @@
  *
  * The first pass is a trial of the keyframe.  Where frames fail with it, one that fails is tried as the keyframe:
  * what touches in one frame is joined in its surface, and is not in the surface of a frame where it parts.  The
- * keyframe with the fewest failures is kept, with what was gathered for it.
+ * keyframe with the fewest failures is kept, with what was gathered for it.  A reference that is one side of the
+ * body lacks things that growth adds: there keyframes are compared by what they have grown to.
  *
  * One owner decides it all: how many passes there are, whether a reference that is one side of the body grows,
  * what is asked of frames that it is to reach, and whether what was gathered makes the next reference.  The
@@ -24,6 +25,7 @@ typedef struct npg_pass_result {
     bool has_changed;        /* it does not explain the capture to both its ends ...    */
     int64_t explained_from, explained_to; /* ... but from and to the frames of these indices */
     int64_t next;                         /* the keyframe to try where it fails; -1: none */
+    bool has_no_surface;                  /* none could be made of it: the one before was followed   */
     bool is_side;     /* it is a side of the body: what it lacks says nothing of how that is joined */
     bool has_images;  /* frames can contradict it */
     bool is_beatable; /* another keyframe's reference could do better */
@@ -36,15 +38,17 @@ typedef struct npg_reference_loop {
     npg_brief brief;                              /* the last one given */
     npg_pass_result tried[NPG_ATTEMPTS_MOST + 1]; /* what each keyframe came to ...        */
     size_t tried_count, kept;                     /* ... and which is the best so far */
+    int64_t rounds;                               /* that each keyframe has, at least */
     size_t attempts;                              /* that may be made after the first */
-    bool is_settled;                              /* the keyframe is no longer in question */
-    bool is_compared;                             /* it was chosen among candidates ...    */
-    npg_pass_result trial;                        /* ... after the pass that came to this  */
-    int64_t grown;                                /* passes that a side of the body has grown through   */
-    int64_t unreached_before;                     /* of the pass before ...                             */
-    int64_t in_vain;                              /* ... and passes in a row that reached no more since */
-    bool is_limited;                              /* the pass to come is for what it explains alone     */
-    int64_t bad_least;                            /* the fewest frames that failed in a pass with a side */
+    bool is_settled;          /* the keyframe is no longer in question, or only when its side has grown */
+    bool is_taken_back;       /* a side before the last one was the best, and grows once more */
+    bool is_compared;         /* it was chosen among candidates ...    */
+    npg_pass_result trial;    /* ... after the pass that came to this  */
+    int64_t grown;            /* passes that a side of the body has grown through   */
+    int64_t unreached_before; /* of the pass before ...                             */
+    int64_t in_vain;          /* ... and passes in a row that reached no more since */
+    bool is_limited;          /* the pass to come is for what it explains alone     */
+    int64_t bad_least;        /* the fewest frames that failed in a pass with a side of the keyframe */
 } npg_reference_loop;
 
 /* The brief of the first pass, of `rounds` that are to gather points, with so many attempts with other keyframes
@@ -55,7 +59,8 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t a
  * silence the alarm: where the reference does not explain all frames, those that it explains are followed once
  * more and gathered alone, if there are three.  A side of the body grows until all frames are reached, or two passes in a row
  * that ask for the least have reached no more, and for as long as each pass leaves fewer of them below the bar; one
- * that has grown for the worse is taken back to its best.  What has grown, or been taken from past its border by
+ * that has grown for the worse is taken back to its best.  Where many frames fail in the end another keyframe is grown, and
+ * the one that fails least is taken.  What has grown, or been taken from past its border by
  * a side that reaches all, is gathered once more: the last frames that were reached had nothing around them
  * yet, and what others see through there shows when it is followed. */
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result);

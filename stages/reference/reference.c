@@ -102,9 +102,11 @@ static int64_t find_next(const npg_worker *worker, const npg_pass_result *result
     int64_t before = result->explained_from, behind = facts->planned_count - 1 - result->explained_to;
     int64_t first = before > behind ? 0 : result->explained_to + 1, found = -1;
     int64_t end = before > behind ? before : facts->planned_count, twice = first + end - 1;
+    bool is_by_worst = facts->unfit_count && (result->is_side || !result->has_changed);
     if (!clouds || !facts->choice.is_open || (!result->has_changed && !facts->unfit_count)) return -1;
-    if ((double)result->bad_count > NPG_MAJORITY * (double)facts->planned_count) return facts->choice.second;
-    if (!result->has_changed) first = 0, twice = 2 * facts->unfit_worst;
+    if (!result->is_side && (double)result->bad_count > NPG_MAJORITY * (double)facts->planned_count)
+        return facts->choice.second;
+    if (is_by_worst) first = 0, end = facts->planned_count, twice = 2 * facts->unfit_worst;
     for (size_t i = 0; i < clouds->count; i++) {
         int64_t index = clouds->list[i].index;
         bool is_in = index >= first && index < end && index != result->key;
@@ -128,7 +130,8 @@ static npg_status result_of(npg_pass_result *result, npg_worker *worker)
                                 .explained_to = facts->has_changed[0] ? facts->changed_at[0] - 1 : last,
                                 .is_side = facts->sensor_count_max && edges.border_edges,
                                 .has_images = facts->view_count_max > 0};
-    if (facts->reference_key != facts->plan.key) /* it has no surface */
+    result->has_no_surface = facts->reference_key != facts->plan.key;
+    if (result->has_no_surface)
         result->bad_count = facts->planned_count;
     else if (result->is_side)
         result->bad_count = facts->unfit_count + facts->unreached_count;
@@ -157,16 +160,18 @@ static void report_attempts(npg_worker *worker, const npg_reference_loop *loop)
     json_object_set_new(npg_worker_report(worker), "attempts", list);
     npg_worker_log(worker, NPG_LOG_INFO, -1, "with this keyframe %lld frames are below the bar: %s",
                    (long long)loop->tried[loop->tried_count - 1].bad_count,
-                   !loop->is_settled            ? "another is tried"
-                   : loop->brief.keeps_gathered ? "it is kept"
-                                                : "the one before is taken back");
+                   loop->is_taken_back || !loop->brief.keeps_gathered ? "the one before is taken back"
+                   : loop->brief.is_attempt                           ? "another is tried"
+                                                                      : "it is kept");
 }
 
 static void tell(npg_worker *worker, const npg_reference_loop *loop, const npg_pass_result *result,
                  bool was_open)
 {
     const npg_brief *brief = &loop->brief;
-    if (was_open && (brief->is_attempt || loop->tried_count > 1)) report_attempts(worker, loop);
+    bool was_compared =
+        result->is_side ? brief->is_attempt || (!brief->rounds_left && !loop->is_taken_back) : was_open;
+    if (was_compared && (brief->is_attempt || loop->tried_count > 1)) report_attempts(worker, loop);
     if (!brief->is_attempt && !brief->takes_gathered)
         npg_worker_log(worker, NPG_LOG_INFO, -1,
                        "the keyframe's surface does not explain all frames: what others show is left out");

@@ -118,11 +118,15 @@ static void a_side_before_cameras_is_looked_at_once_more_and_trimmed(void **stat
     assert_true(brief.trims_only);
 }
 
-/* A pass with a side of the body in which so many of 100 frames failed. */
-static npg_brief fails(npg_reference_loop *loop, int64_t bad, bool has_images)
+/* A pass with a side of the keyframe `key` in which so many of 100 frames failed; 3 is the keyframe to try next. */
+static npg_brief fails(npg_reference_loop *loop, int64_t key, int64_t bad, bool has_images)
 {
-    const npg_pass_result side = {
-        .frame_count = 100, .bad_count = bad, .is_side = true, .has_images = has_images};
+    const npg_pass_result side = {.key = key,
+                                  .frame_count = 100,
+                                  .bad_count = bad,
+                                  .next = 3,
+                                  .is_side = true,
+                                  .has_images = has_images};
     return npg_reference_next(loop, &side);
 }
 
@@ -132,13 +136,13 @@ static void a_side_grows_for_as_long_as_fewer_frames_fail(void **state)
     npg_reference_loop loop;
     npg_reference_begin(&loop, 1, 0);
     for (int64_t bad = 60; bad > 3; bad -= 10) {
-        assert_int_equal(fails(&loop, bad, false).rounds_left, 1);
+        assert_int_equal(fails(&loop, 5, bad, false).rounds_left, 1);
         assert_true(loop.brief.is_best && loop.brief.takes_gathered);
     }
-    assert_int_equal(fails(&loop, 9, false).rounds_left, 0); /* one less is chance */
+    assert_int_equal(fails(&loop, 5, 9, false).rounds_left, 0); /* one less is chance */
     npg_reference_begin(&loop, 1, 0);
-    fails(&loop, 60, false);
-    assert_int_equal(fails(&loop, 2, false).rounds_left, 0); /* and a few that fail are no reason */
+    fails(&loop, 5, 60, false);
+    assert_int_equal(fails(&loop, 5, 2, false).rounds_left, 0); /* and a few that fail are no reason */
 }
 
 static void a_side_that_has_grown_for_the_worse_is_taken_back(void **state)
@@ -146,16 +150,57 @@ static void a_side_that_has_grown_for_the_worse_is_taken_back(void **state)
     (void)state;
     npg_reference_loop loop;
     npg_reference_begin(&loop, 1, 0);
-    assert_true(fails(&loop, 60, true).is_best);
-    assert_true(fails(&loop, 10, true).is_best);
-    npg_brief brief = fails(&loop, 12, true); /* two more are chance */
+    assert_true(fails(&loop, 5, 60, true).is_best);
+    assert_true(fails(&loop, 5, 10, true).is_best);
+    npg_brief brief = fails(&loop, 5, 12, true); /* two more are chance */
     assert_true(brief.is_best && brief.is_last_look && !brief.takes_back);
-    brief = fails(&loop, 30, true);
+    brief = fails(&loop, 5, 30, true);
     assert_true(brief.takes_back && brief.takes_poses && !brief.trims_only);
     assert_int_equal(brief.rounds_left, 1); /* that frames contradict it */
-    brief = fails(&loop, 12, true);
+    brief = fails(&loop, 5, 12, true);
     assert_true(brief.trims_only && brief.takes_gathered && !brief.takes_back);
     assert_int_equal(brief.rounds_left, 0);
+}
+
+static void a_side_that_fails_is_grown_from_another_keyframe(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    for (int64_t bad = 40; bad < 100; bad += 20) { /* of the other: fewer, or more */
+        bool is_better = bad < 50;
+        npg_reference_begin(&loop, 1, 1);
+        assert_false(fails(&loop, 5, 50, false).is_attempt); /* it may grow to more */
+        npg_brief brief = fails(&loop, 5, 50, false);
+        assert_true(brief.is_attempt && !brief.takes_gathered && !brief.takes_poses);
+        assert_int_equal(brief.key, 3);
+        assert_int_equal(brief.rounds_left, 1);
+        assert_false(fails(&loop, 3, bad, false).is_attempt);
+        brief = fails(&loop, 3, bad, false);
+        assert_int_equal(brief.key, is_better ? 3 : 5);
+        assert_int_equal(brief.rounds_left, !is_better);
+        if (is_better) continue;
+        fails(&loop, 5, 50, false); /* once more as it was, and then it is enough */
+        brief = fails(&loop, 5, 50, false);
+        assert_int_equal(brief.key, 5);
+        assert_int_equal(brief.rounds_left, 0);
+    }
+    npg_reference_begin(&loop, 1, 1);
+    fails(&loop, 5, 20, false);
+    assert_false(fails(&loop, 5, 20, false).is_attempt); /* where most frames are good it takes too long */
+}
+
+static void a_keyframe_without_a_side_is_given_up(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    const npg_pass_result none = {
+        .key = 3, .frame_count = 100, .bad_count = 100, .next = 4, .has_no_surface = true, .is_side = true};
+    npg_reference_begin(&loop, 1, 1);
+    fails(&loop, 5, 50, false);
+    assert_int_equal(fails(&loop, 5, 50, false).key, 3);
+    npg_brief brief = npg_reference_next(&loop, &none);
+    assert_int_equal(brief.key, 5);
+    assert_int_equal(brief.rounds_left, 1);
 }
 
 static void a_whole_body_is_not_trimmed(void **state)
@@ -317,6 +362,8 @@ int main(void)
         cmocka_unit_test(a_side_before_cameras_is_looked_at_once_more_and_trimmed),
         cmocka_unit_test(a_side_grows_for_as_long_as_fewer_frames_fail),
         cmocka_unit_test(a_side_that_has_grown_for_the_worse_is_taken_back),
+        cmocka_unit_test(a_side_that_fails_is_grown_from_another_keyframe),
+        cmocka_unit_test(a_keyframe_without_a_side_is_given_up),
         cmocka_unit_test(a_whole_body_is_not_trimmed),
         cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),
         cmocka_unit_test(growth_never_goes_on_for_ever),
