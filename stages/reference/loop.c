@@ -10,19 +10,25 @@
  * more frames. */
 #define EXPLAINED_STEP 0.1
 
-static const npg_brief first_brief = {.key = -1,
-                                      .takes_gathered = true,
-                                      .keeps_gathered = true,
-                                      .takes_poses = true,
-                                      .gathers_from = INT64_MIN,
-                                      .gathers_to = INT64_MAX,
-                                      .explained_least = NPG_MOST};
+static void begin_with(npg_reference_loop *loop, int64_t key)
+{
+    loop->brief = (npg_brief){.rounds_left = loop->rounds,
+                              .key = key,
+                              .takes_gathered = true,
+                              .keeps_gathered = true,
+                              .takes_poses = true,
+                              .gathers_from = INT64_MIN,
+                              .gathers_to = INT64_MAX,
+                              .explained_least = NPG_MOST};
+    loop->grown = loop->unreached_before = loop->in_vain = 0;
+    loop->bad_least = INT64_MAX;
+    loop->is_limited = false;
+}
 
 npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t attempts)
 {
-    *loop = (npg_reference_loop){
-        .rounds = rounds, .attempts = attempts, .bad_least = INT64_MAX, .brief = first_brief};
-    loop->brief.rounds_left = rounds;
+    *loop = (npg_reference_loop){.rounds = rounds, .attempts = attempts};
+    begin_with(loop, -1);
     return loop->brief;
 }
 
@@ -105,20 +111,7 @@ static const npg_pass_result *settle_key(npg_reference_loop *loop)
 
 /* ---- a side that has grown ---- */
 
-/* Of the keyframe all is walked again from its own surface. */
-static void begin_with(npg_reference_loop *loop, int64_t key)
-{
-    loop->brief = first_brief;
-    loop->brief.rounds_left = loop->rounds;
-    loop->brief.key = key;
-    loop->brief.is_attempt = true;
-    loop->brief.takes_gathered = loop->brief.takes_poses = false;
-    loop->grown = loop->unreached_before = loop->in_vain = 0;
-    loop->bad_least = INT64_MAX;
-    loop->is_limited = false;
-}
-
-/* The last pass of a keyframe whose surface is a side of the body has ended.  Where most frames are not good it lacks
+/* The last pass of a keyframe whose surface is a side of the body has ended.  Where too few frames are good it lacks
  * what no growth gave it, and another keyframe, that shows what fails, is grown in its place.  The one that fails least
  * is taken in the end: where it is one before, its passes are walked once more (their poses lie in the job's store). */
 static void compare_grown(npg_reference_loop *loop, const npg_pass_result *result)
@@ -129,7 +122,9 @@ static void compare_grown(npg_reference_loop *loop, const npg_pass_result *resul
     bool tries = may_try(loop, result->next) && (double)good < NPG_MOST * (double)result->frame_count;
     if (!tries && keeps_last(loop)) return;
     loop->is_taken_back = !tries;
-    begin_with(loop, tries ? result->next : loop->tried[loop->kept].key);
+    begin_with(loop, tries ? result->next : loop->tried[loop->kept].key); /* from its own surface */
+    loop->brief.is_attempt = true;
+    loop->brief.takes_gathered = loop->brief.takes_poses = false;
 }
 
 /* ---- what comes next ---- */

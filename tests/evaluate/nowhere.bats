@@ -51,9 +51,9 @@ shares() { # OUT
 }
 
 @test "a ball that can leave the place is brought out of it" {
-    # it is turned inside out on the way, and some of it stays at the margin
-    run_it free --reference with_ball.obj --bars flipped=100,invented=100,unsupported=100,nowhere=100
-    paste <(shares free) <(shares ball) | awk '{ print } $1 > $2 / 4 { exit 1 }'
+    nodes=2400
+    run_it free --reference with_ball.obj --bars flipped=100,invented=100,unsupported=100 # it is turned inside out on the way
+    shares free | awk '{ print } $1 > 0.01 { exit 1 }'
 }
 
 @test "half of the body in the reference: points are lost, and the frame says so" {
