@@ -59,6 +59,7 @@ void npg_frame_arrays(npg_store_array list[NPG_FRAME_ARRAYS], const npg_frame *f
         {"normals", offsetof(npg_frame, normals), f->point_count, ROW},
         {"colours", offsetof(npg_frame, colours), f->point_count, 4},
         {"sensors", offsetof(npg_frame, sensors), f->point_count, 1},
+        {"isolated", offsetof(npg_frame, isolated), f->point_count, 1},
         {"sensor_local", offsetof(npg_frame, sensor_local), f->sensor_count, ROW},
         {"views", offsetof(npg_frame, views), f->sensor_count, sizeof *f->views},
         {"view_cells", offsetof(npg_frame, view_cells), f->view_cell_count, sizeof(float)},
@@ -127,6 +128,7 @@ void npg_frame_keep(npg_frame *frame, const uint8_t *keep)
         if (frame->normals) memmove(frame->normals + 3 * kept, frame->normals + 3 * i, 3 * sizeof(float));
         if (frame->colours) memmove(frame->colours + 4 * kept, frame->colours + 4 * i, 4);
         if (frame->sensors) frame->sensors[kept] = frame->sensors[i];
+        if (frame->isolated) frame->isolated[kept] = frame->isolated[i];
         kept++;
     }
     frame->point_count = kept;

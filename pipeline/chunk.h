@@ -105,6 +105,7 @@ typedef struct npg_frame {
     float *normals;        /* N x 3, owned, unit length, or NULL                      */
     uint8_t *colours;      /* N x 4 RGBA, sRGB; alpha 0: not known; owned, or NULL    */
     uint8_t *sensors;      /* N: index of the sensor that saw it; owned, or NULL      */
+    uint8_t *isolated;     /* N: not 0: it lies apart, and no surface is made of it; owned, or NULL */
     bool has_sure_normals; /* they face the sensor that saw them: no side is open  */
     size_t sensor_count;   /* S, 0: where sensors stood is not known                  */
     float *sensor_local;   /* S x 3, owned, world - origin; NaN: it saw nothing, or NULL */
@@ -138,7 +139,7 @@ void npg_frame_clear(npg_frame *frame);
 void npg_frame_forget_sensors(npg_frame *frame);
 
 /* The arrays that a frame owns: what it is copied, kept on disk and freed by. */
-enum { NPG_FRAME_ARRAYS = 9 };
+enum { NPG_FRAME_ARRAYS = 10 };
 void npg_frame_arrays(npg_store_array list[NPG_FRAME_ARRAYS], const npg_frame *frame);
 
 /* The frame without its arrays, which stay its own. */

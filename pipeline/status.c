@@ -45,6 +45,11 @@ npg_status npg_error_prefix(npg_status status, const char *format, ...)
     return npg_error(status, "%s: %s", prefix, error_text);
 }
 
+npg_status npg_error_advise(npg_status status, const char *what)
+{
+    return status >= 0 ? status : npg_error(status, "%s; %s", error_text, what);
+}
+
 npg_status npg_error_errno(npg_status fallback, const char *format, ...)
 {
     int cause = errno;

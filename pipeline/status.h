@@ -15,7 +15,11 @@ npg_status npg_error(npg_status status, const char *format, ...) NPG_PRINTF(2, 3
  * does nothing for status >= 0. */
 npg_status npg_error_prefix(npg_status status, const char *format, ...) NPG_PRINTF(2, 3);
 
-/* The same with the status and text of errno: NPG_DISK for a full or failing disk,
+/* Put "; <what to do>" behind it, likewise. */
+npg_status npg_error_advise(npg_status status, const char *what);
+#define NPG_ADVISE_KEEP_GOING "--keep-going goes on without such frames"
+
+/* As npg_error(), with the status and text of errno: NPG_DISK for a full or failing disk,
  * NPG_MEMORY, else fallback. */
 npg_status npg_error_errno(npg_status fallback, const char *format, ...) NPG_PRINTF(2, 3);
 

@@ -68,9 +68,6 @@ extern const char npg_schema_of_report[], npg_schema_of_done[];
 /* In the order of the help; ends with a name of NULL (neupig.c). */
 extern const npg_verb npg_verbs[];
 
-/* NULL when there is none of that name. */
-const npg_verb *npg_verb_find(const char *name);
-
 npg_status npg_verb_run(const npg_cli *cli);
 npg_status npg_verb_append(const npg_cli *cli);
 npg_status npg_verb_batch(const npg_cli *cli);

@@ -115,7 +115,8 @@ const npg_verb npg_verbs[] = {
      npg_verb_version},
     {0}};
 
-const npg_verb *npg_verb_find(const char *name)
+/* NULL when there is none of that name. */
+static const npg_verb *find_verb(const char *name)
 {
     for (const npg_verb *verb = npg_verbs; verb->name; verb++)
         if (!strcmp(verb->name, name)) return verb;
@@ -151,7 +152,7 @@ npg_status npg_verb_help(const npg_cli *cli)
 {
     const help_settings *s = cli->values;
     const char *subject = cli->operand_count ? cli->operands[0] : "";
-    const npg_verb *verb = npg_verb_find(subject);
+    const npg_verb *verb = find_verb(subject);
     if (!*subject)
         npg_help_verbs(stdout);
     else if (!strcmp(subject, "method"))
@@ -205,7 +206,7 @@ int main(int argc, char **argv)
     const char *name = argv[1];
     if (!strcmp(name, "--help") || !strcmp(name, "-h")) argv[1] = help;
     if (!strcmp(name, "--version") || !strcmp(name, "-V")) argv[1] = version;
-    const npg_verb *verb = npg_verb_find(argv[1]);
+    const npg_verb *verb = find_verb(argv[1]);
     if (verb) return close_stdout(npg_cli_run(verb, argc - 1, argv + 1));
     npg_status status = unknown_verb(name);
     fprintf(stderr, "neupig: %s\n", npg_error_text());

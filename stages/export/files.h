@@ -23,7 +23,6 @@ typedef struct npg_mesh_view {
  * of the extent, else double.  NPG_DISK with path and cause; NPG_USAGE for another ending. */
 npg_status npg_write_mesh(const char *path, const npg_mesh_view *mesh);
 npg_status npg_write_ply(const char *path, const npg_mesh_view *mesh);
-npg_status npg_write_obj(const char *path, const npg_mesh_view *mesh);
 
 /* An OBJ that is the OBJ file `like` with other positions and normals (one per vertex; without, none): all
  * its other lines stay, so texture coordinates per corner, groups, polygons and materials are kept.  Of mesh

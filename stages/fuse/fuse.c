@@ -58,8 +58,9 @@ typedef struct cloud {
     npg_arena arena;
     float *points; /* unit */
     npg_skinned *warped;
-    const float *normals;   /* of the frame, a loan, or NULL */
-    const uint8_t *colours; /* the same */
+    const float *normals;    /* of the frame, a loan, or NULL */
+    const uint8_t *colours;  /* the same */
+    const uint8_t *isolated; /* the same */
     size_t count;
 } cloud;
 
@@ -67,6 +68,7 @@ static npg_status open_cloud(cloud *c, const npg_worker *worker, const npg_frame
 {
     c->count = frame->point_count;
     c->normals = frame->normals;
+    c->isolated = frame->isolated;
     c->colours = npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? NULL : frame->colours;
     c->points = npg_arena_take(&c->arena, c->count, 3 * sizeof *c->points);
     c->warped = npg_arena_take(&c->arena, c->count, sizeof *c->warped);
@@ -112,7 +114,7 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
         const npg_skinned *p = &c->warped[i];
         bool is_near = (double)p->dist <= near_dist;
         double share = (double)p->dist / near_dist, robust = 1 / (1 + share * share);
-        if (is_contradicted(s, p)) {
+        if ((c->isolated && c->isolated[i]) || is_contradicted(s, p)) {
             s->strays++;
             continue;
         }

@@ -97,7 +97,9 @@ static npg_status read_or_skip(npg_capture *c, npg_frame *frame, int64_t index, 
     npg_status status = read_slot(c, frame, index, origin, is_last_use);
     if (status != NPG_BAD_INPUT) return status;
     if (!c->keep_going)
-        return npg_error_prefix(status, "frame %lld", (long long)c->list->slots[index].number);
+        return npg_error_advise(
+            npg_error_prefix(status, "frame %lld", (long long)c->list->slots[index].number),
+            NPG_ADVISE_KEEP_GOING);
     c->is_bad[index] = 1;
     frame->is_skipped = true;
     return NPG_PARTIAL;

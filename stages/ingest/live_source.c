@@ -108,7 +108,7 @@ static npg_status next_followed(npg_live_source *live, npg_frame *frame)
     if (status != NPG_PARTIAL) return status;
     if (!npg_worker_settings(live->worker)->keep_going) {
         npg_frame_clear(frame);
-        return NPG_BAD_INPUT; /* the text is the reader's */
+        return npg_error_advise(NPG_BAD_INPUT, NPG_ADVISE_KEEP_GOING); /* the text is the reader's */
     }
     npg_worker_warn(live->worker, true, frame->number, "skipped: %s", npg_error_text());
     snprintf(live->cause, sizeof live->cause, "%s", npg_error_text());

@@ -7,6 +7,19 @@
 #include "geometry/limits.h"
 #include "pipeline/cost.h"
 
+/* Those that lie apart are followed, but are no surface. */
+static npg_status drop_isolated(npg_point_set *set, const npg_frame *frame)
+{
+    uint8_t *keep;
+    if (!frame->isolated) return NPG_OK;
+    NPG_TRY(npg_alloc(&keep, NPG_FOR_MESH, set->count));
+    for (size_t i = 0; i < set->count; i++)
+        keep[i] = !frame->isolated[npg_spread_index(i, set->count, frame->point_count)];
+    set->count = npg_points_keep(set->points, set->normals, set->count, keep);
+    npg_release(&keep);
+    return NPG_OK;
+}
+
 /* What only carries the frames of a fusing pass is made of an even choice: Poisson's time goes with the points. */
 static npg_status take_frame(npg_point_set *set, npg_worker *worker, const npg_frame *frame)
 {
@@ -17,6 +30,7 @@ static npg_status take_frame(npg_point_set *set, npg_worker *worker, const npg_f
     NPG_TRY(npg_alloc_array(&set->points, NPG_FOR_MESH, set->count, 3 * sizeof(float)));
     if (frame->normals) NPG_TRY(npg_alloc_array(&set->normals, NPG_FOR_MESH, set->count, 3 * sizeof(float)));
     npg_points_spread(set->points, set->normals, set->count, frame->pos_local, frame->normals, n);
+    NPG_TRY(drop_isolated(set, frame));
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, set->points, set->points, set->count);
     return NPG_OK;
 }

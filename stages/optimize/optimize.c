@@ -84,7 +84,8 @@ static const npg_option options[] = {
     {0}};
 /* clang-format on */
 
-const npg_solver *npg_solver_of(const npg_worker *worker)
+/* The row that a run's options and stages ask for. */
+static const npg_solver *solver_of(const npg_worker *worker)
 {
     static const npg_solver *const of_poses[] = {&npg_solver_joint, &npg_solver_grids};
     const char *name = npg_options_get(npg_worker_options(worker), "solver");
@@ -165,7 +166,7 @@ static npg_status init(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     s->hand.total = -1;
-    s->row = npg_solver_of(worker);
+    s->row = solver_of(worker);
     NPG_TRY(check_widths(&s->settings.grid));
     NPG_TRY(refuse_unused(worker, s->row));
     NPG_TRY(check_overlap(worker, s->row));
@@ -418,9 +419,8 @@ static npg_status process(npg_worker *worker, npg_chunk **chunk)
 static int64_t epochs_of(const npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    return npg_solver_of(worker)->needs_poses
-               ? s->settings.epochs
-               : npg_paper_epochs(&s->settings, &npg_worker_facts(worker)->plan);
+    return solver_of(worker)->needs_poses ? s->settings.epochs
+                                          : npg_paper_epochs(&s->settings, &npg_worker_facts(worker)->plan);
 }
 
 static npg_status flush(npg_worker *worker)
@@ -450,7 +450,7 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     size_t frames = (size_t)(window.last - window.first + 1) + (size_t)plan->overlap;
     size_t chunk = (size_t)npg_worker_settings(worker)->chunk_frames;
     *chunks_held = (frames + chunk - 1) / chunk + 1;
-    return npg_window_memory(npg_solver_of(worker), &s->settings, npg_worker_verts_at_most(worker), frames,
+    return npg_window_memory(solver_of(worker), &s->settings, npg_worker_verts_at_most(worker), frames,
                              facts->point_count_max);
 }
 
@@ -461,7 +461,7 @@ static double expects(const npg_worker *worker, npg_pass pass)
     const double fit_s_per_frame = 0.08, cores = 2;
     double frames = (double)npg_worker_facts(worker)->frame_count;
     if (pass != NPG_PASS_SOLVE) return 0;
-    if (npg_solver_of(worker)->needs_poses) return fit_s_per_frame * frames;
+    if (solver_of(worker)->needs_poses) return fit_s_per_frame * frames;
     double vertices = (double)npg_worker_verts_at_most(worker);
     double sample =
         npg_cost_decoder_flops((double)s->settings.grid.width_1, (double)s->settings.grid.width_2);

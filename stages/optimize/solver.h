@@ -106,9 +106,6 @@ typedef struct npg_solver {
  * one over all frames, which starts at the reference. */
 int64_t npg_paper_epochs(const npg_solver_settings *settings, const npg_plan *plan);
 
-/* The row that a run's options and stages ask for. */
-const npg_solver *npg_solver_of(const npg_worker *worker);
-
 extern const npg_solver npg_solver_joint, npg_solver_grids, npg_solver_paper;
 
 #endif

@@ -44,8 +44,8 @@ static const npg_option outlier_options[] = {
     /* type         name             place              default   least most  shown as or words */
     NPG_ROW_FLAG(   "outliers",      AT(drop_isolated), "yes",
         "Keep isolated points. Without it they are dropped by the statistical filter that PCL has, too, "
-        "repeated until it finds no more; but not those of depth images, which are told by the pixels beside "
-        "them"),
+        "repeated until it finds no more; those of depth images are only kept out of the reference, since few of "
+        "a hand that reaches to the sensor lie apart, too"),
     NPG_KEY(REAL,   "outlier-ratio", AT(ratio),         "5",      0.5,  100, NULL,
         "Standard deviations above the mean at which a point is isolated"),
     NPG_KEY(INT,    "points-max",    AT(point_max),     "0",      0,    4e9, NULL,
@@ -223,7 +223,9 @@ static npg_status name_frame(npg_status status, const npg_frame *frame)
 static npg_status skip_or_fail(npg_worker *worker, npg_frame *frame, npg_status status)
 {
     outlier_state *s = npg_worker_state(worker);
-    if (status != NPG_BAD_INPUT || !npg_worker_settings(worker)->keep_going) return name_frame(status, frame);
+    if (status != NPG_BAD_INPUT) return name_frame(status, frame);
+    if (!npg_worker_settings(worker)->keep_going)
+        return npg_error_advise(name_frame(status, frame), NPG_ADVISE_KEEP_GOING);
     if (comes_first(worker, frame))
         npg_worker_warn(worker, true, frame->number, "skipped %s: %s",
                         frame->path ? frame->path : "what was pushed", npg_error_text());
@@ -326,8 +328,6 @@ static npg_status check_frame_and_normals(npg_worker *worker, npg_frame *frame)
     return NPG_OK;
 }
 
-/* Points of depth images are told from mixed pixels by those beside them in the image (ingest/rig/depth_points.c): in
- * space the few of a hand that reaches to the sensor lie apart, too. */
 static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
 {
     const outlier_state *s = npg_worker_state(worker);
@@ -337,7 +337,7 @@ static npg_status drop_isolated(npg_worker *worker, npg_chunk *chunk)
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FRAMES, frame_count + 1, sizeof *frames));
     for (size_t i = 0; i < frame_count; i++) {
         npg_frame *frame = npg_chunk_frame(chunk, i);
-        if (!is_done(frame) && !frame->views) frames[count++] = frame;
+        if (!is_done(frame)) frames[count++] = frame;
     }
     npg_status status = npg_isolated_drop(frames, count, NPG_NEIGHBOURS, s->ratio);
     npg_release(&frames);

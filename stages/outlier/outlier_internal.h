@@ -55,8 +55,9 @@ npg_status npg_find_isolated(uint8_t *keep, const float *points, size_t point_co
 /* Bytes that takes at most. */
 size_t npg_find_isolated_memory(size_t point_count);
 
-/* Drop the isolated points of frames that have been cleaned of all else, several at a time in threads; skipped
- * and empty frames are left alone.  NPG_MEMORY; errors name the frame. */
+/* Drop the isolated points of frames that have been cleaned of all else, those of depth images are marked
+ * (npg_frame.isolated); several frames at a time in threads; skipped and empty ones are left alone.  NPG_MEMORY;
+ * errors name the frame. */
 npg_status npg_isolated_drop(npg_frame *const *frames, size_t count, int neighbours, double ratio);
 
 /* One view: whether one sensor saw all points of a cloud, and from where.

@@ -166,11 +166,21 @@ static npg_status filter_share(void *user, size_t part)
     return NPG_OK;
 }
 
-static void drop_from(npg_frame *frame, const uint8_t *keep)
+/* Points of depth images are told from mixed pixels by those beside them in the image (ingest/rig/depth_points.c): in
+ * space the few of a hand that reaches to the sensor lie apart, too, and the motion is to follow it.  Speckles do not
+ * lie apart in the image, and would be spikes of a surface. */
+static npg_status drop_from(npg_frame *frame, const uint8_t *keep)
 {
     size_t before = frame->point_count;
-    if (memchr(keep, 0, before)) npg_frame_keep(frame, keep);
-    frame->cleaning.isolated += before - frame->point_count;
+    if (!memchr(keep, 0, before)) return NPG_OK;
+    if (!frame->views) {
+        npg_frame_keep(frame, keep);
+        frame->cleaning.isolated += before - frame->point_count;
+        return NPG_OK;
+    }
+    NPG_TRY(npg_alloc(&frame->isolated, NPG_FOR_FRAMES, before));
+    for (size_t i = 0; i < before; i++) frame->isolated[i] = !keep[i];
+    return NPG_OK;
 }
 
 npg_status npg_isolated_drop(npg_frame *const *frames, size_t count, int neighbours, double ratio)
@@ -185,7 +195,7 @@ npg_status npg_isolated_drop(npg_frame *const *frames, size_t count, int neighbo
     npg_status status = npg_arena_status(&scratch);
     if (!status && s.parts) status = npg_parallel(filter_share, &s, s.parts);
     for (size_t i = 0; i < count && !status; i++)
-        if (s.keep[i]) drop_from(frames[i], s.keep[i]);
+        if (s.keep[i]) status = drop_from(frames[i], s.keep[i]);
     npg_arena_release(&scratch);
     return status;
 }

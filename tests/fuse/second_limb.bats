@@ -8,14 +8,11 @@ setup_file() {
 
 # The share of the vertices of MESH.ply to the right of where the arm hangs: beyond MESH.ply
 beyond() {
-    python3 - "$1" <<'P'
-import struct, sys
-head, body = open(sys.argv[1], "rb").read().split(b"end_header\n", 1)
-lines = head.decode().split("\n")
-count = int(next(l for l in lines if l.startswith("element vertex")).split()[2])
-fields = [l for l in lines[: next(i for i, l in enumerate(lines) if "element face" in l)] if l.startswith("property")]
-size = sum(1 if "char" in l else 4 for l in fields)
-print(sum(struct.unpack_from("<f", body, size * v)[0] > 0.42 for v in range(count)) / count)
+    PYTHONPATH="$BATS_TEST_DIRNAME/../support" python3 - "$1" <<'P'
+import sys
+from plain_files import read_vertices
+vertices = read_vertices(sys.argv[1])
+print(sum(v["x"] > 0.42 for v in vertices) / len(vertices))
 P
 }
 

@@ -16,19 +16,10 @@ setup() {
 
 # The least height of the slot's floor near its middle (the ball of the keyframe 3 stands at x = 0.15): floor RUN
 floor_of() {
-    python3 - "$1/reference.ply" <<'P'
-import struct, sys
-head, body = open(sys.argv[1], "rb").read().split(b"end_header\n", 1)
-lines = head.decode().split("\n")
-count = int(next(l for l in lines if l.startswith("element vertex")).split()[2])
-names = [l.split()[-1] for l in lines[: next(i for i, l in enumerate(lines) if "element face" in l)] if l.startswith("property")]
-size = 4 * len(names)
-tops = []
-for v in range(count):
-    x, y, z = struct.unpack_from("<3f", body, size * v)
-    if abs(x - 0.15) < 0.1 and abs(y) < 0.5 and z > 0:
-        tops.append(z)
-print(min(tops))
+    PYTHONPATH="$BATS_TEST_DIRNAME/../support" python3 - "$1/reference.ply" <<'P'
+import sys
+from plain_files import read_vertices
+print(min(v["z"] for v in read_vertices(sys.argv[1]) if abs(v["x"] - 0.15) < 0.1 and abs(v["y"]) < 0.5 and v["z"] > 0))
 P
 }
 

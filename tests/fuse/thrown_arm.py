@@ -8,9 +8,10 @@ and points to the side in the others, with nothing between.
 import json
 import math
 import os
-import struct
 import sys
-import zlib
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+from plain_files import write_depth
 
 FRAMES, WIDE, HIGH, FOCAL, AWAY = 12, 160, 120, 120.0, 2.0
 RODS = [  # x y x y radius, metres, y down
@@ -34,27 +35,15 @@ def depth_of(rods, x, y):
 
 
 def image_of(rods, sway):
-    rows = b""
-    for v in range(HIGH):
-        row = [depth_of(rods, (u - WIDE / 2) / FOCAL * AWAY - sway, (v - HIGH / 2) / FOCAL * AWAY) for u in range(WIDE)]
-        rows += b"\0" + struct.pack(">%dH" % WIDE, *row)
-    return rows
-
-
-def write_png(path, rows):
-    def part(name, data):
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-
-    with open(path, "wb") as f:
-        f.write(b"\x89PNG\r\n\x1a\n" + part(b"IHDR", struct.pack(">IIBBBBB", WIDE, HIGH, 16, 0, 0, 0, 0)))
-        f.write(part(b"IDAT", zlib.compress(rows)) + part(b"IEND", b""))
+    return [[depth_of(rods, (u - WIDE / 2) / FOCAL * AWAY - sway, (v - HIGH / 2) / FOCAL * AWAY) for u in range(WIDE)]
+            for v in range(HIGH)]
 
 
 def main(out):
     os.makedirs(out + "/depth")
     for n in range(FRAMES):
         arm = HANGS if n < FRAMES // 2 else POINTS
-        write_png("%s/depth/%04d.png" % (out, n), image_of(RODS + [arm], 0.004 * n))
+        write_depth("%s/depth/%04d.png" % (out, n), image_of(RODS + [arm], 0.004 * n))
     camera = {"width": WIDE, "height": HIGH, "fx": FOCAL, "fy": FOCAL, "cx": WIDE / 2, "cy": HIGH / 2}
     sensor = {"name": "front", "depth": "depth/%04d.png", "camera": camera}
     with open(out + "/rig.json", "w") as f:

@@ -14,6 +14,9 @@ import random
 import struct
 import sys
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+from plain_files import read_vertices
+
 FRAMES, POINTS, SENSOR = 24, 1500, (0.0, 0.5, 8.0)
 
 
@@ -70,25 +73,20 @@ def write(out):
             file.write(b"".join(rows))
 
 
-def read_vertices(path):
-    head, body = open(path, "rb").read().split(b"end_header\n", 1)
-    lines = head.decode().split("\n")
-    count = int(next(l for l in lines if l.startswith("element vertex")).split()[2])
-    faces = next(i for i, l in enumerate(lines) if "element face" in l)
-    size = 4 * sum(l.startswith("property") for l in lines[:faces])
-    return [struct.unpack_from("<3f", body, size * v) for v in range(count)]
+def places(path):
+    return [(v["x"], v["y"], v["z"]) for v in read_vertices(path)]
 
 
 def slide(run):
     back = []
     for frame, path in enumerate(sorted(glob.glob(f"{run}/meshes/*.ply"))):
-        back.append([turned(v, -angle_of(frame)) for v in read_vertices(path)[::10]])
+        back.append([turned(v, -angle_of(frame)) for v in places(path)[::10]])
     diagonal, strays = 3.1, []
     for v in range(len(back[0])):
         middle = [sorted(f[v][a] for f in back)[len(back) // 2] for a in range(3)]
         strays += [math.dist(f[v], middle) / diagonal for f in back]
     key = int(sys.argv[3])
-    have = [turned(v, -angle_of(key)) for v in read_vertices(f"{run}/reference.ply")]
+    have = [turned(v, -angle_of(key)) for v in places(f"{run}/reference.ply")]
     chance = random.Random(2)
     asked = [place(chance)[0] for _ in range(300)]
     found = sum(min(math.dist(p, v) for v in have) < 0.1 for p in asked)

@@ -118,6 +118,29 @@ static void drop_scattered(size_t scattered)
     npg_frame_clear(&frame);
 }
 
+/* In an image they have neighbours: they are followed, though no surface is made of them. */
+static void those_of_depth_images_are_marked(void **state)
+{
+    (void)state;
+    npg_frame frame;
+    size_t marked = 0;
+    uint8_t keep[1000];
+    open_frame(&frame, 1000, 8);
+    shape_put(frame.pos_local + 3 * 7, 900, 900, 900);
+    frame.sensor_count = 1;
+    assert_int_equal(npg_alloc(&frame.views, NPG_FOR_FRAMES, sizeof *frame.views), NPG_OK);
+    assert_int_equal(drop_isolated(&frame), NPG_OK);
+    assert_int_equal(frame.point_count, 1000);
+    assert_int_equal(frame.cleaning.isolated, 0);
+    for (size_t i = 0; i < 1000; i++) marked += frame.isolated[i];
+    assert_true(frame.isolated[7] && marked <= 10);
+    memset(keep, 1, sizeof keep);
+    keep[3] = 0;
+    npg_frame_keep(&frame, keep); /* marks go with their points */
+    assert_true(frame.isolated[6] && frame.pos_local[3 * 6] > 800);
+    npg_frame_clear(&frame);
+}
+
 /* So many that they make each other look usual, too. */
 static void scattered_points_go_few_or_many(void **state)
 {
@@ -304,12 +327,17 @@ static void a_sensor_that_is_none_is_refused(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_not_a_number_goes),       cmocka_unit_test(duplicates_go),
-        cmocka_unit_test(too_many_points_are_thinned),     cmocka_unit_test(of_a_clean_cloud_hardly_any_go),
-        cmocka_unit_test(scattered_points_go_few_or_many), cmocka_unit_test(a_side_of_few_points_stays),
-        cmocka_unit_test(frames_are_searched_together),    cmocka_unit_test(what_is_no_surface_is_refused),
-        cmocka_unit_test(refused_memory_is_survived),      cmocka_unit_test(the_stage_skips_or_refuses),
-        cmocka_unit_test(a_sensor_that_is_none_is_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(what_is_not_a_number_goes),
+                                       cmocka_unit_test(duplicates_go),
+                                       cmocka_unit_test(too_many_points_are_thinned),
+                                       cmocka_unit_test(of_a_clean_cloud_hardly_any_go),
+                                       cmocka_unit_test(scattered_points_go_few_or_many),
+                                       cmocka_unit_test(a_side_of_few_points_stays),
+                                       cmocka_unit_test(frames_are_searched_together),
+                                       cmocka_unit_test(what_is_no_surface_is_refused),
+                                       cmocka_unit_test(refused_memory_is_survived),
+                                       cmocka_unit_test(the_stage_skips_or_refuses),
+                                       cmocka_unit_test(a_sensor_that_is_none_is_refused),
+                                       cmocka_unit_test(those_of_depth_images_are_marked)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -80,17 +80,15 @@ assert c.shape == m["vertices"].shape[:2] + (4,) and (c[0] != c[1]).any()
 assert (c[..., 3] == 255).mean() > 0.5
 assert "colours" not in n'
     # USD has them as samples, in linear light
-    python3 - own <<'P'
-import re, struct, sys
+    PYTHONPATH="$BATS_TEST_DIRNAME/../support" python3 - own <<'P'
+import re, sys
+from plain_files import read_vertices
 text = open(sys.argv[1] + "/motion.usda").read()
 samples = text.split("primvars:displayColor.timeSamples = {")[1].split("}")[0]
 for frame in (0, 1):
-    head, body = open(f"{sys.argv[1]}/meshes/frame_000{frame}.ply", "rb").read().split(b"end_header\n", 1)
-    fields = re.findall(rb"property (float|uchar) (\w+)", head.split(b"element face")[0])
-    form = "<" + "".join({b"float": "f", b"uchar": "B"}[kind] for kind, _ in fields)
-    red = [name for _, name in fields].index(b"red")
-    colour = struct.unpack_from(form, body)[red:red + 3]
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (byte / 255 for byte in colour)]
+    vertex = read_vertices(f"{sys.argv[1]}/meshes/frame_000{frame}.ply")[0]
+    shares = [vertex[name] / 255 for name in ("red", "green", "blue")]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in shares]
     first = re.search(rf"\n +{frame}: \[\(([^)]*)\)", samples).group(1).split(",")
     assert all(abs(float(a) - b) < 1e-5 for a, b in zip(first, linear)), (frame, first, linear)
 P
@@ -217,11 +215,9 @@ assert len(before[2]["correction"]) == 16'
     [ "$status" -eq 3 ]
     [[ "$output" == *"depth_0003.png: a 8-bit RGB PNG; a depth image must be 16-bit grey"* ]]
     cp capture/rig/camera1/depth_0003.png bad/camera1/depth_0003.png
-    /usr/bin/python3 -c 'import struct, sys, zlib
-def chunk(name, data): return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-sys.stdout.buffer.write(b"\x89PNG\r\n\x1a\n"
-    + chunk(b"IHDR", struct.pack(">IIBBBBB", 240, 180, 16, 0, 0, 0, 0))
-    + chunk(b"IDAT", zlib.compress((b"\0" + 480 * b"\xff") * 180)) + chunk(b"IEND", b""))' >bad/camera2/depth_0002.png
+    PYTHONPATH="$BATS_TEST_DIRNAME/../support" python3 -c '
+from plain_files import write_depth
+write_depth("bad/camera2/depth_0002.png", 180 * [240 * [65535]])'
     run "$NEUPIG" probe bad
     [ "$status" -eq 7 ]
     [[ "$output" == *"1 depth images have no depth in any pixel, the first is bad/camera2/depth_0002.png"* ]]

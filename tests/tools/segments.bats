@@ -225,18 +225,14 @@ END
     "$NEUPIG" run painted -o hues "${small[@]}" --effort usual --segments auto --keyframe 3
     second=$(basename "$(ls -d hues/segment_* | tail -1)")
     [ "$second" != segment_0000 ]
-    python3 - segment_0000 "$second" <<'END'
-import re, struct, sys
+    PYTHONPATH="$BATS_TEST_DIRNAME/../support" python3 - segment_0000 "$second" <<'END'
+import sys
+from plain_files import read_vertices
 reds = []
 for segment in sys.argv[1:]:
-    head, body = open(f"hues/{segment}/reference.ply", "rb").read().split(b"end_header\n", 1)
-    fields = re.findall(rb"property (float|double|uchar) (\w+)", head.split(b"element face")[0])
-    row = "<" + "".join({b"float": "f", b"double": "d", b"uchar": "B"}[kind] for kind, _ in fields)
-    red = [name for _, name in fields].index(b"red")
-    count = int(re.search(rb"element vertex (\d+)", head).group(1))
-    rows = [struct.unpack_from(row, body, i * struct.calcsize(row))[red:red + 4] for i in range(count)]
-    assert all(abs(r[2] - 200) <= 1 and r[1] <= 1 and r[3] >= 254 for r in rows), rows[:5]
-    reds.append(sorted(r[0] for r in rows)[count // 2])
+    rows = read_vertices(f"hues/{segment}/reference.ply")
+    assert all(abs(r["blue"] - 200) <= 1 and r["green"] <= 1 and r["alpha"] >= 254 for r in rows), rows[:5]
+    reds.append(sorted(r["red"] for r in rows)[len(rows) // 2])
 assert reds[0] < 70 < reds[1], reds
 END
     for segment in hues/segment_*; do

@@ -73,7 +73,7 @@ static void write_face(npg_file *file, const npg_mesh_view *mesh, const uint32_t
     npg_file_print(file, "%s\n", text);
 }
 
-npg_status npg_write_obj(const char *path, const npg_mesh_view *mesh)
+static npg_status write_obj(const char *path, const npg_mesh_view *mesh)
 {
     npg_file *file;
     NPG_TRY(npg_file_open(&file, path));
@@ -263,6 +263,6 @@ npg_status npg_write_mesh(const char *path, const npg_mesh_view *mesh)
 {
     const char *slash = strrchr(path, '/'), *dot = strrchr(slash ? slash : path, '.');
     if (dot && !strcasecmp(dot, ".ply")) return npg_write_ply(path, mesh);
-    if (dot && !strcasecmp(dot, ".obj")) return npg_write_obj(path, mesh);
+    if (dot && !strcasecmp(dot, ".obj")) return write_obj(path, mesh);
     return npg_error(NPG_USAGE, "%s: a mesh is written as .ply or .obj", path);
 }
