@@ -234,6 +234,7 @@ static npg_status skip_or_fail(npg_worker *worker, npg_frame *frame, npg_status 
     npg_release(&frame->pos_local);
     npg_release(&frame->normals);
     npg_release(&frame->colours);
+    npg_release(&frame->isolated);
     npg_frame_forget_sensors(frame);
     s->skipped++;
     return NPG_OK;
