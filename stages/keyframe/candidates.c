@@ -111,12 +111,14 @@ static size_t least_but(const npg_candidate *list, size_t count, size_t but)
 
 /* The one of the least figure, where that is better than the one by score clearly, or beyond chance.  One of them is
  * enough: a candidate does well near itself and badly far off, so the differences of two scatter whichever is
- * better. */
-static size_t least_of(const npg_candidate *list, size_t count, size_t scored)
+ * better.  A side, whose reference grows, is another matter: most of what its figure says is what it lacks yet, and the
+ * one that shows most has least to find a place for. */
+static size_t least_of(const npg_candidate *list, size_t count, size_t scored, bool is_side)
 {
     size_t first = scored < count ? scored : 0, least = least_but(list, count, count);
     if (least == count) return first;
-    return !list[first].is_followed || npg_judged_clearly(&list[least].judgement, &list[first].judgement) ||
+    bool is_clearly = !is_side && npg_judged_clearly(&list[least].judgement, &list[first].judgement);
+    return !list[first].is_followed || is_clearly ||
                    npg_judged_worse(&list[first].judgement, &list[least].judgement)
                ? least
                : first;
@@ -129,11 +131,11 @@ static int64_t flaws(const npg_candidate *one)
     return one->handles + (int64_t)one->pieces;
 }
 
-/* Of those that points can't tell apart the one of fewest flaws. */
-static size_t best_of(const npg_candidate *list, size_t count, size_t scored)
+/* Of those that points can't tell apart the one of fewest flaws; a side is cut by what stands before it. */
+size_t npg_candidates_best(const npg_candidate *list, size_t count, size_t scored, bool is_side)
 {
-    size_t least = least_of(list, count, scored), best = least;
-    for (size_t i = 0; i < count && list[least].is_followed; i++) {
+    size_t least = least_of(list, count, scored, is_side), best = least;
+    for (size_t i = 0; i < count && list[least].is_followed && !is_side; i++) {
         const npg_candidate *one = &list[i], *so_far = &list[best];
         bool is_as_good = one->is_followed && !npg_judged_worse(&one->judgement, &list[least].judgement);
         bool is_nearer =
@@ -158,7 +160,7 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
     size_t at = 0;
     while (at < c.count && list[at].index != scored) at++;
     *count = c.count;
-    *best = best_of(list, c.count, at);
+    *best = npg_candidates_best(list, c.count, at, npg_judge_is_by_images(middle));
     return status;
 }
 

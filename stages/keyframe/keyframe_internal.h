@@ -87,7 +87,8 @@ npg_status npg_outside_restore(npg_outside *outside, const npg_record *in, const
  * nothing of limbs that touch, of what a sensor did not see, or of a pose that is hard to follow from.  So
  * frames spread over the sample are tried, too: each one's points are made a draft surface, and the judge
  * (reference/reference.h) says how it fares.  The frame by score stays unless another is clearly
- * better, or not worse beyond chance with fewer handles and pieces. */
+ * better, or not worse beyond chance with fewer handles and pieces; before one depth camera unless another is
+ * better beyond chance. */
 
 typedef struct npg_candidate {
     size_t at; /* place in the clouds */
@@ -106,6 +107,10 @@ void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, c
 
 /* Whether no frame of the choice is in fewer pieces than this one. */
 bool npg_candidates_is_whole(const npg_choice *choice, const uint8_t *pieces, int64_t index);
+
+/* Place in the list of the one to take; scored: of the frame by score, count: it is none of them; is_side: they
+ * are what one depth camera sees. */
+size_t npg_candidates_best(const npg_candidate *list, size_t count, size_t scored, bool is_side);
 
 /* Try the candidates among the clouds.  *count: how many; *best: place in the list of the one to take;
  * scored: index of the frame by score.  NPG_MEMORY, NPG_STOPPED. */

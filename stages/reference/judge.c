@@ -35,7 +35,7 @@ struct npg_judging {
 
 /* One camera sees a side that seldom is the whole body's: what points say of its detail is more than what they say of a
  * limb that it lacks.  So there counts what its images call wrong, as the verdict has it. */
-static bool is_by_images(const npg_candidate_cloud *cloud)
+bool npg_judge_is_by_images(const npg_candidate_cloud *cloud)
 {
     return cloud->space && cloud->sensor_count == 1;
 }
@@ -52,7 +52,8 @@ static npg_status points_off(double *mean, const npg_judging *j, const npg_candi
     if (!status) status = npg_surface_closest_near(j->surface, hits, cloud->held, n, NULL, 1);
     for (size_t i = 0; i < n && !status; i++) sum += fmin(1, (double)hits[i].dist_sq / j->tau_sq);
     *mean = n ? sum / (double)n : 0;
-    if (!status && is_by_images(cloud)) *mean = npg_free_space_lost_share(cloud->space, cloud->held, hits, n);
+    if (!status && npg_judge_is_by_images(cloud))
+        *mean = npg_free_space_lost_share(cloud->space, cloud->held, hits, n);
     npg_arena_release(&scratch);
     return status;
 }
@@ -168,7 +169,7 @@ static npg_status judge_frame(double *figure, double *own, npg_judging *j, const
 {
     double points, surface, seen, behind;
     NPG_TRY(points_off(&points, j, cloud));
-    if (is_by_images(cloud)) {
+    if (npg_judge_is_by_images(cloud)) {
         *figure = *own = points + 2 * nowhere(j, cloud, vert_unit);
         return NPG_OK;
     }
@@ -242,7 +243,7 @@ npg_status npg_judge(npg_judgement *judgement, const npg_candidate_clouds *cloud
 {
     npg_judging *j;
     NPG_TRY(npg_judging_open(&j, clouds, at, mesh, settings));
-    const npg_tracker_settings *tracking = is_by_images(j->own) ? &side_tracking : &judge_tracking;
+    const npg_tracker_settings *tracking = npg_judge_is_by_images(j->own) ? &side_tracking : &judge_tracking;
     npg_status status = settings->in_own_alone
                             ? npg_judging_see(j, j->own, mesh->vert_pos)
                             : npg_candidate_follow(clouds, at, mesh, tracking, npg_judging_see, j);

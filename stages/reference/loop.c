@@ -163,6 +163,8 @@ static void go_on(npg_reference_loop *loop, const npg_pass_result *result)
     bool is_whole_now =
         loop->unreached_before ? !result->unreached_count : result->is_side && !brief->is_side;
     bool gains = result->is_side && has_gained(loop, result);
+    bool reaches_more = is_more(result, loop->unreached_before, result->unreached_count);
+    loop->stands_still = result->is_side && result->has_images && !gains && !reaches_more;
     grow(loop, result->unreached_count);
     loop->unreached_before = result->unreached_count;
     brief->rounds_left -= !brief->leaves_open && !is_whole_now && !gains;
@@ -200,7 +202,8 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
         end_taken_back(brief);
     else if (!result->has_no_surface)
         go_on(loop, result);
-    if (result->is_side && (!brief->rounds_left || result->has_no_surface)) compare_grown(loop, result);
+    if (result->is_side && (!brief->rounds_left || result->has_no_surface || loop->stands_still))
+        compare_grown(loop, result);
     return *brief;
 }
 

@@ -47,6 +47,7 @@ typedef struct npg_reference_loop {
     int64_t grown;            /* passes that a side of the body has grown through   */
     int64_t unreached_before; /* of the pass before ...                             */
     int64_t in_vain;          /* ... and passes in a row that reached no more since */
+    bool stands_still;        /* the last one left no fewer frames below the bar, and reached no more */
     bool is_limited;          /* the pass to come is for what it explains alone     */
     int64_t bad_least;        /* the fewest frames that failed in a pass with a side of the keyframe */
 } npg_reference_loop;

@@ -55,6 +55,9 @@ void npg_judging_close(npg_judging **judging);
  * mean: negative, `one` is better.  0 where fewer than three are in common. */
 double npg_judged_against(const npg_judgement *one, const npg_judgement *other);
 
+/* Whether a frame is a side of the body before one camera, which images tell it by. */
+bool npg_judge_is_by_images(const npg_candidate_cloud *cloud);
+
 /* Whether the figure of `one` is better by so much that it is no matter of how coarsely a surface is followed. */
 bool npg_judged_clearly(const npg_judgement *one, const npg_judgement *other);
 

@@ -6,6 +6,7 @@
 #include <cmocka.h>
 
 #include "geometry/geometry.h"
+#include "keyframe/keyframe_internal.h"
 #include "tests/support/legs.h"
 #include "tests/support/test_chain.h"
 
@@ -116,12 +117,36 @@ static void a_frame_whose_leg_is_cut_off_is_not_chosen(void **state)
     assert_int_equal(s.euler, 2); /* of one piece */
 }
 
+/* A candidate whose figures in three frames scatter by `scatter` around a mean. */
+static npg_candidate judged(double mean, double scatter, size_t pieces)
+{
+    npg_candidate one = {.is_followed = true, .pieces = pieces, .judgement = {.mean = mean, .count = 3}};
+    for (size_t i = 0; i < NPG_CHOICE_FRAMES; i++)
+        one.judgement.of_frame[i] = i < 3 ? mean + scatter * ((double)i - 1) : (double)NAN;
+    return one;
+}
+
+static void before_one_camera_the_frame_by_score_stays_but_for_chance(void **state)
+{
+    (void)state;
+    const npg_candidate by_chance[] = {judged(0.17, 0.2, 3), judged(0.1, 0, 1), judged(0.12, 0, 1)};
+    assert_int_equal(npg_candidates_best(by_chance, 3, 0, true), 0);
+    assert_int_equal(npg_candidates_best(by_chance, 3, 0, false),
+                     1); /* of a body: clearly better, in one piece */
+    const npg_candidate beyond[] = {judged(0.17, 0.001, 1), judged(0.1, 0, 2), judged(0.101, 0.01, 1)};
+    assert_int_equal(npg_candidates_best(beyond, 3, 0, true), 1); /* in two: something stands before it */
+    assert_int_equal(npg_candidates_best(beyond, 3, 0, false), 2);
+    const npg_candidate lost[] = {{.is_followed = false}, judged(0.3, 0, 1)};
+    assert_int_equal(npg_candidates_best(lost, 2, 0, true), 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_score_alone_takes_touching_feet),
         cmocka_unit_test(a_frame_with_feet_apart_is_chosen),
         cmocka_unit_test(a_frame_whose_leg_is_cut_off_is_not_chosen),
+        cmocka_unit_test(before_one_camera_the_frame_by_score_stays_but_for_chance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

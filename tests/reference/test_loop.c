@@ -189,6 +189,25 @@ static void a_side_that_fails_is_grown_from_another_keyframe(void **state)
     assert_false(fails(&loop, 5, 20, false).is_attempt); /* where most frames are good it takes too long */
 }
 
+static void growth_that_stands_still_makes_room_for_another_keyframe(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 1, 1);
+    assert_false(fails(&loop, 5, 60, true).is_attempt);
+    assert_false(fails(&loop, 5, 40, true).is_attempt); /* it gains */
+    npg_brief brief = fails(&loop, 5, 40, true);
+    assert_true(brief.is_attempt && !brief.takes_poses); /* not looked at once more before */
+    assert_int_equal(brief.key, 3);
+    assert_false(fails(&loop, 3, 80, true).is_attempt);
+    brief = fails(&loop, 3, 80, true); /* nor does the other one gain, and it has more of them */
+    assert_int_equal(brief.key, 5);
+    for (int64_t bad = 60; bad >= 40; bad -= 20) fails(&loop, 5, bad, true); /* as before */
+    brief = fails(&loop, 5, 40, true);
+    assert_true(brief.rounds_left && !brief.is_attempt); /* now it goes on to its end */
+    assert_int_equal(brief.key, 5);
+}
+
 static void a_keyframe_without_a_side_is_given_up(void **state)
 {
     (void)state;
@@ -363,6 +382,7 @@ int main(void)
         cmocka_unit_test(a_side_grows_for_as_long_as_fewer_frames_fail),
         cmocka_unit_test(a_side_that_has_grown_for_the_worse_is_taken_back),
         cmocka_unit_test(a_side_that_fails_is_grown_from_another_keyframe),
+        cmocka_unit_test(growth_that_stands_still_makes_room_for_another_keyframe),
         cmocka_unit_test(a_keyframe_without_a_side_is_given_up),
         cmocka_unit_test(a_whole_body_is_not_trimmed),
         cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),
