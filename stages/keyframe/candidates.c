@@ -109,19 +109,22 @@ static size_t least_but(const npg_candidate *list, size_t count, size_t but)
     return least;
 }
 
-/* The one of the least figure, where that is better than the one by score clearly, or beyond chance.  One of them is
- * enough: a candidate does well near itself and badly far off, so the differences of two scatter whichever is
- * better.  A side, whose reference grows, is another matter: most of what its figure says is what it lacks yet, and the
- * one that shows most has least to find a place for. */
+/* Whether the frame by score gives way to the one of the least figure: where that is better clearly, or beyond chance.
+ * One of them is enough: a candidate does well near itself and badly far off, so the differences of two scatter
+ * whichever is better.  Most of what the figure of a side says is what it lacks yet, in stretches of frames that fail
+ * together, and its reference grows: there the one that shows most stays unless it fails as a pose to follow from. */
+static bool gives_way(const npg_candidate *scored, const npg_candidate *least, bool is_side)
+{
+    if (!scored->is_followed) return true;
+    if (is_side) return scored->judgement.mean > NPG_CLEARLY * least->judgement.mean;
+    return npg_judged_clearly(&least->judgement, &scored->judgement) ||
+           npg_judged_worse(&scored->judgement, &least->judgement);
+}
+
 static size_t least_of(const npg_candidate *list, size_t count, size_t scored, bool is_side)
 {
     size_t first = scored < count ? scored : 0, least = least_but(list, count, count);
-    if (least == count) return first;
-    bool is_clearly = !is_side && npg_judged_clearly(&list[least].judgement, &list[first].judgement);
-    return !list[first].is_followed || is_clearly ||
-                   npg_judged_worse(&list[first].judgement, &list[least].judgement)
-               ? least
-               : first;
+    return least < count && gives_way(&list[first], &list[least], is_side) ? least : first;
 }
 
 /* Parts that touch in one frame are joined in its surface, which is a handle more, and what a hole cuts off is a piece
