@@ -50,7 +50,7 @@ typedef struct npg_choice {
     size_t count, candidate_count; /* count 0: there is no choosing pass */
     int64_t frames[NPG_CHOICE_FRAMES];
     bool is_candidate[NPG_CHOICE_FRAMES]; /* may become the keyframe; plan.key is one of them */
-    int64_t second; /* the best of the candidates that were compared, but for the one chosen; -1: none */
+    int64_t second; /* the candidate to try where most frames fail with the one chosen; -1: none */
     bool is_open;   /* the user has named no keyframe: where it fails, another of these frames may be tried */
     bool is_tried;  /* the key alone is read: others are compared if its pass says that one could do better */
 } npg_choice;

@@ -99,12 +99,10 @@ static unsigned colour_weight(int64_t away)
 }
 
 /* The reference lies as the keyframe shows the body, whatever the other frames' motion says: what was carried to a
- * place where the keyframe saw that nothing is, was carried wrongly, and would be a limb for the second time.  No motion
- * blurs that, so all that is outside of its outline goes: what is kept there makes limbs thick and their rims ragged. */
+ * place where the keyframe saw that nothing is, was carried wrongly, and would be a limb for the second time. */
 static bool is_contradicted(const state *s, const npg_skinned *p)
 {
-    return npg_free_space_is_empty(s->key_space, p->point) ||
-           npg_free_space_is_beside(s->key_space, p->point);
+    return npg_free_space_is_empty(s->key_space, p->point);
 }
 
 /* Weights fall with the distance as the tracker's do (Geman and McClure); what is near is averaged where the

@@ -14,10 +14,9 @@
 typedef struct view {
     double to_sensor[12], first[2], step; /* as npg_depth_view, but of unit coordinates */
     ptrdiff_t width, height;
-    float *cells; /* H x W: the depth of each, infinite: nothing, 0: not known           */
-    float *
-        nearest; /* H x W: the least depth within AROUND, infinite: none; NaN: none, but not all is known there */
-    float *near_by; /* H x W: the same within BESIDE */
+    float *cells;   /* H x W: the depth of each, infinite: nothing, 0: not known           */
+    float *nearest; /* H x W: the least depth within AROUND, infinite: none                */
+    float *near_by; /* H x W: the same within BESIDE; NaN: none, but not all is known there */
 } view;
 
 struct npg_free_space {
@@ -60,19 +59,6 @@ static void take_least(float *out, const float *in, const view *v, ptrdiff_t rea
         }
 }
 
-/* out[i]: the least of the depths within reach of cell i.  scratch: 2 x H x W. */
-static void find_least(float *out, float *scratch, const view *v, ptrdiff_t reach)
-{
-    size_t count = (size_t)v->width * (size_t)v->height;
-    float *known = scratch + count;
-    for (size_t i = 0; i < count; i++) scratch[i] = v->cells[i] > 0;
-    take_least(known, scratch, v, reach);
-    for (size_t i = 0; i < count; i++) scratch[i] = v->cells[i] > 0 ? v->cells[i] : INFINITY;
-    take_least(out, scratch, v, reach);
-    for (size_t i = 0; i < count; i++)
-        if (isinf(out[i]) && !(known[i] > 0)) out[i] = NAN;
-}
-
 static npg_status open_view(view *v, npg_arena *arena, const npg_depth_view *from, const float *cells,
                             const npg_frame_box *box)
 {
@@ -86,14 +72,20 @@ static npg_status open_view(view *v, npg_arena *arena, const npg_depth_view *fro
     v->cells = npg_arena_take(arena, count, sizeof *v->cells);
     v->nearest = npg_arena_take(arena, count, sizeof *v->nearest);
     v->near_by = npg_arena_take(arena, count, sizeof *v->near_by);
-    float *rows = npg_arena_take(&scratch, count, 2 * sizeof *rows);
+    float *of_each = npg_arena_take(&scratch, count, sizeof *of_each),
+          *known = npg_arena_take(&scratch, count, sizeof *known);
     npg_status status = npg_arena_status(arena);
     if (!status) status = npg_arena_status(&scratch);
-    if (!status) {
-        for (size_t i = 0; i < count; i++) v->cells[i] = (float)(box->scale * (double)cells[i]);
-        find_least(v->nearest, rows, v, AROUND);
-        find_least(v->near_by, rows, v, BESIDE);
+    for (size_t i = 0; i < count && !status; i++) {
+        v->cells[i] = (float)(box->scale * (double)cells[i]);
+        of_each[i] = v->cells[i] > 0;
     }
+    if (!status) take_least(known, of_each, v, BESIDE);
+    for (size_t i = 0; i < count && !status; i++) of_each[i] = v->cells[i] > 0 ? v->cells[i] : INFINITY;
+    if (!status) take_least(v->nearest, of_each, v, AROUND);
+    if (!status) take_least(v->near_by, of_each, v, BESIDE);
+    for (size_t i = 0; i < count && !status; i++)
+        if (isinf(v->near_by[i]) && !(known[i] > 0)) v->near_by[i] = NAN;
     npg_arena_release(&scratch);
     return status;
 }
@@ -167,26 +159,6 @@ bool npg_free_space_is_empty(const npg_free_space *space, const float place[3])
     if (!space) return false;
     npg_sight_kind kind = npg_free_space_look(space, place);
     return kind == NPG_SEEN_EMPTY || kind == NPG_SEEN_BESIDE;
-}
-
-/* Whether a sensor saw past a place, and by a cell around it. */
-static bool is_beside(const view *v, const float place[3])
-{
-    double at[3];
-    see_from(at, v, place);
-    if (!(at[2] > 0)) return false;
-    double x = floor((at[0] / at[2] - v->first[0]) / v->step),
-           y = floor((at[1] / at[2] - v->first[1]) / v->step);
-    if (!(x >= 0 && y >= 0 && x < (double)v->width && y < (double)v->height)) return false;
-    ptrdiff_t i = (ptrdiff_t)y * v->width + (ptrdiff_t)x;
-    return isinf(v->nearest[i]);
-}
-
-bool npg_free_space_is_beside(const npg_free_space *space, const float place[3])
-{
-    for (size_t i = 0; space && i < space->count; i++)
-        if (is_beside(&space->views[i], place)) return true;
-    return false;
 }
 
 /* ---- the way out ---- */

@@ -55,11 +55,9 @@ typedef struct npg_free_space npg_free_space;
 npg_status npg_free_space_open(npg_free_space **space, const npg_frame *frame, const npg_frame_box *box);
 void npg_free_space_close(npg_free_space **space);
 
-/* All thread-safe.  is_empty: whether a sensor saw that nothing is there; is_beside: whether it lies outside of what
- * a sensor saw at all, by more than what one of its rays may have hit; false of no space (NULL). */
+/* Both thread-safe.  is_empty: whether a sensor saw that nothing is there; false of no space (NULL). */
 npg_sight_kind npg_free_space_look(const npg_free_space *space, const float place[3]);
 bool npg_free_space_is_empty(const npg_free_space *space, const float place[3]);
-bool npg_free_space_is_beside(const npg_free_space *space, const float place[3]);
 
 /* to = the nearest place out of what a sensor saw to be empty: of those on the rays of the cells in which it
  * measured a depth, at that depth or farther.  Of several sensors that say so the one with the nearest.  false, with

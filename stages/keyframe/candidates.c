@@ -111,14 +111,12 @@ static size_t least_but(const npg_candidate *list, size_t count, size_t but)
 
 /* Whether the frame by score gives way to the one of the least figure: where that is better clearly, or beyond chance.
  * One of them is enough: a candidate does well near itself and badly far off, so the differences of two scatter
- * whichever is better.  Most of what the figure of a side says is what it lacks yet, in stretches of frames that fail
- * together, and its reference grows: there the one that shows most stays unless it fails as a pose to follow from. */
+ * whichever is better.  Most of what the figure of a side says is what it lacks yet, and its reference grows: there
+ * clearly says nothing. */
 static bool gives_way(const npg_candidate *scored, const npg_candidate *least, bool is_side)
 {
-    if (!scored->is_followed) return true;
-    if (is_side) return scored->judgement.mean > NPG_CLEARLY * least->judgement.mean;
-    return npg_judged_clearly(&least->judgement, &scored->judgement) ||
-           npg_judged_worse(&scored->judgement, &least->judgement);
+    return !scored->is_followed || npg_judged_worse(&scored->judgement, &least->judgement) ||
+           (!is_side && npg_judged_clearly(&least->judgement, &scored->judgement));
 }
 
 static size_t least_of(const npg_candidate *list, size_t count, size_t scored, bool is_side)
@@ -148,6 +146,11 @@ size_t npg_candidates_best(const npg_candidate *list, size_t count, size_t score
     return best;
 }
 
+static bool is_of_side(const npg_candidate_clouds *clouds)
+{
+    return npg_judge_is_by_images(&clouds->list[clouds->count / 2]);
+}
+
 npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count, size_t *best,
                               const npg_candidate_clouds *clouds, int64_t scored,
                               const npg_poisson_settings *settings)
@@ -163,7 +166,7 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
     size_t at = 0;
     while (at < c.count && list[at].index != scored) at++;
     *count = c.count;
-    *best = npg_candidates_best(list, c.count, at, npg_judge_is_by_images(middle));
+    *best = npg_candidates_best(list, c.count, at, is_of_side(clouds));
     return status;
 }
 
@@ -195,6 +198,15 @@ static void report_candidates(npg_worker *worker, const npg_candidate *list, siz
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }
 
+/* Index of the candidate to try where most frames fail with the best one; -1: there is none.  Of a side the one by
+ * score, which shows most: it has least to find a place for. */
+static int64_t second_of(const npg_candidate *list, size_t count, size_t best, int64_t scored, bool is_side)
+{
+    size_t second = least_but(list, count, best);
+    if (is_side && list[best].index != scored) return scored;
+    return second < count ? list[second].index : -1;
+}
+
 static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_candidate_clouds *clouds)
 {
     const npg_facts *facts = npg_worker_facts(worker);
@@ -207,8 +219,7 @@ static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_c
     NPG_TRY(npg_candidates_try(list, &count, &best, clouds, facts->plan.key, &settings));
     if (!count) return NPG_OK;
     *chosen = list[best];
-    size_t second = least_but(list, count, best);
-    if (second < count) npg_own(worker, choice)->second = list[second].index;
+    npg_own(worker, choice)->second = second_of(list, count, best, facts->plan.key, is_of_side(clouds));
     report_candidates(worker, list, count, npg_clock_s() - since);
     npg_worker_log(worker, NPG_LOG_INFO, chosen->number, "is the keyframe, of %zu candidates (judged %.3f)",
                    count, chosen->judgement.mean);

@@ -94,7 +94,7 @@ static npg_status is_beatable(bool *beatable, npg_worker *worker)
 
 /* The keyframe to try next; -1: none, or it is not in question.  Of the sample the frame that fails most clearly: in the
  * middle of the longer stretch that the reference does not explain; without one, nearest to the worst of those below
- * the bar.  Where most frames fail none of them says more than the others, and the second of the judge is next. */
+ * the bar.  Where most frames fail none of them says more than the others, and the second of the choice is next. */
 static int64_t find_next(const npg_worker *worker, const npg_pass_result *result)
 {
     const npg_facts *facts = npg_worker_facts(worker);
@@ -104,8 +104,7 @@ static int64_t find_next(const npg_worker *worker, const npg_pass_result *result
     int64_t end = before > behind ? before : facts->planned_count, twice = first + end - 1;
     bool is_by_worst = facts->unfit_count && (result->is_side || !result->has_changed);
     if (!clouds || !facts->choice.is_open || (!result->has_changed && !facts->unfit_count)) return -1;
-    if (!result->is_side && (double)result->bad_count > NPG_MAJORITY * (double)facts->planned_count)
-        return facts->choice.second;
+    if ((double)result->bad_count > NPG_MAJORITY * (double)facts->planned_count) return facts->choice.second;
     if (is_by_worst) first = 0, end = facts->planned_count, twice = 2 * facts->unfit_worst;
     for (size_t i = 0; i < clouds->count; i++) {
         int64_t index = clouds->list[i].index;

@@ -129,30 +129,6 @@ static void what_is_not_known_is_not_empty(void **state)
     assert_int_equal(look(&s, &unit, 0.6f, 0.3f, 0), NPG_SEEN_BESIDE);
 }
 
-static bool is_beside(const scene *s, float x)
-{
-    npg_free_space *space;
-    const float place[3] = {x, 0, 0};
-    assert_int_equal(npg_free_space_open(&space, &s->frame, &unit), NPG_OK);
-    bool is_so = npg_free_space_is_beside(space, place);
-    npg_free_space_close(&space);
-    return is_so;
-}
-
-static void what_lies_a_cell_outside_of_the_outline_is_beside(void **state)
-{
-    static scene s;
-    (void)state;
-    make_scene(&s, INFINITY);
-    assert_false(is_beside(&s, 0.38f) || is_beside(&s, 0.41f)); /* in the last cell, in the next one */
-    assert_true(is_beside(&s, 0.45f) && is_beside(&s, -0.6f));
-    assert_false(npg_free_space_is_beside(NULL, (const float[3]){0}));
-    s.cells[SIDE / 2 * SIDE + SIDE / 2 + HALF + 2] = 0; /* around 0.45 not all is known */
-    assert_false(is_beside(&s, 0.45f));
-    make_scene(&s, 6); /* a wall was seen there */
-    assert_false(is_beside(&s, 0.45f));
-}
-
 static void a_background_that_was_measured_is_no_end(void **state)
 {
     static scene s;
@@ -227,7 +203,6 @@ int main(void)
         cmocka_unit_test(the_shortest_way_out_is_found),
         cmocka_unit_test(without_any_depth_there_is_no_way_out),
         cmocka_unit_test(what_is_not_known_is_not_empty),
-        cmocka_unit_test(what_lies_a_cell_outside_of_the_outline_is_beside),
         cmocka_unit_test(a_background_that_was_measured_is_no_end),
         cmocka_unit_test(one_of_two_sensors_is_enough),
         cmocka_unit_test(the_box_is_minded),
