@@ -98,13 +98,6 @@ static unsigned colour_weight(int64_t away)
     return weight > 1 ? (unsigned)lrint(weight) : 1;
 }
 
-/* The reference lies as the keyframe shows the body, whatever the other frames' motion says: what was carried to a
- * place where the keyframe saw that nothing is, was carried wrongly, and would be a limb for the second time. */
-static bool is_contradicted(const state *s, const npg_skinned *p)
-{
-    return npg_free_space_is_empty(s->key_space, p->point);
-}
-
 /* Weights fall with the distance as the tracker's do (Geman and McClure); what is near is averaged where the
  * surface is, so that noise across the surface averages out; what is not, where it is. */
 static npg_status add_points(state *s, const cloud *c, int64_t frame, double near_dist, double far_dist)
@@ -114,7 +107,9 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
         const npg_skinned *p = &c->warped[i];
         bool is_near = (double)p->dist <= near_dist;
         double share = (double)p->dist / near_dist, robust = 1 / (1 + share * share);
-        if ((c->isolated && c->isolated[i]) || is_contradicted(s, p)) {
+        /* The reference lies as the keyframe shows the body, whatever the other frames' motion says: what was carried
+         * to where the keyframe saw that nothing is would be a limb for the second time. */
+        if ((c->isolated && c->isolated[i]) || npg_free_space_is_empty(s->key_space, p->point)) {
             s->strays++;
             continue;
         }

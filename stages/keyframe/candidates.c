@@ -109,10 +109,9 @@ static size_t least_but(const npg_candidate *list, size_t count, size_t but)
     return least;
 }
 
-/* Whether the frame by score gives way to the one of the least figure: where that is better clearly, or beyond chance.
- * One of them is enough: a candidate does well near itself and badly far off, so the differences of two scatter
- * whichever is better.  Most of what the figure of a side says is what it lacks yet, and its reference grows: there
- * clearly says nothing. */
+/* Whether the frame by score gives way: to what is better clearly, or beyond chance.  One of them is enough: a candidate
+ * does well near itself and badly far off, so the differences of two scatter whichever is better.  The figure of a side
+ * says most of all what it lacks yet, and its reference grows: there "clearly" says nothing. */
 static bool gives_way(const npg_candidate *scored, const npg_candidate *least, bool is_side)
 {
     return !scored->is_followed || npg_judged_worse(&scored->judgement, &least->judgement) ||
@@ -146,11 +145,6 @@ size_t npg_candidates_best(const npg_candidate *list, size_t count, size_t score
     return best;
 }
 
-static bool is_of_side(const npg_candidate_clouds *clouds)
-{
-    return npg_judge_is_by_images(&clouds->list[clouds->count / 2]);
-}
-
 npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count, size_t *best,
                               const npg_candidate_clouds *clouds, int64_t scored,
                               const npg_poisson_settings *settings)
@@ -166,7 +160,7 @@ npg_status npg_candidates_try(npg_candidate list[NPG_CHOICE_MAX], size_t *count,
     size_t at = 0;
     while (at < c.count && list[at].index != scored) at++;
     *count = c.count;
-    *best = npg_candidates_best(list, c.count, at, is_of_side(clouds));
+    *best = npg_candidates_best(list, c.count, at, npg_judge_is_by_images(middle));
     return status;
 }
 
@@ -198,15 +192,6 @@ static void report_candidates(npg_worker *worker, const npg_candidate *list, siz
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }
 
-/* Index of the candidate to try where most frames fail with the best one; -1: there is none.  Of a side the one by
- * score, which shows most: it has least to find a place for. */
-static int64_t second_of(const npg_candidate *list, size_t count, size_t best, int64_t scored, bool is_side)
-{
-    size_t second = least_but(list, count, best);
-    if (is_side && list[best].index != scored) return scored;
-    return second < count ? list[second].index : -1;
-}
-
 static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_candidate_clouds *clouds)
 {
     const npg_facts *facts = npg_worker_facts(worker);
@@ -219,7 +204,11 @@ static npg_status compare(npg_worker *worker, npg_candidate *chosen, const npg_c
     NPG_TRY(npg_candidates_try(list, &count, &best, clouds, facts->plan.key, &settings));
     if (!count) return NPG_OK;
     *chosen = list[best];
-    npg_own(worker, choice)->second = second_of(list, count, best, facts->plan.key, is_of_side(clouds));
+    size_t second = least_but(list, count, best);
+    if (second < count) npg_own(worker, choice)->second = list[second].index;
+    /* Of sides the one by score shows most. */
+    if (npg_judge_is_by_images(&clouds->list[chosen->at]) && chosen->index != facts->plan.key)
+        npg_own(worker, choice)->second = facts->plan.key;
     report_candidates(worker, list, count, npg_clock_s() - since);
     npg_worker_log(worker, NPG_LOG_INFO, chosen->number, "is the keyframe, of %zu candidates (judged %.3f)",
                    count, chosen->judgement.mean);

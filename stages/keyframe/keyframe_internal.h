@@ -87,8 +87,7 @@ npg_status npg_outside_restore(npg_outside *outside, const npg_record *in, const
  * nothing of limbs that touch, of what a sensor did not see, or of a pose that is hard to follow from.  So
  * frames spread over the sample are tried, too: each one's points are made a draft surface, and the judge
  * (reference/reference.h) says how it fares.  The frame by score stays unless another is clearly
- * better, or not worse beyond chance with fewer handles and pieces; before one depth camera unless another is
- * better beyond chance. */
+ * better, or not worse beyond chance with fewer handles and pieces; a side unless one is better beyond chance. */
 
 typedef struct npg_candidate {
     size_t at; /* place in the clouds */

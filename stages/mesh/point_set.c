@@ -7,14 +7,16 @@
 #include "geometry/limits.h"
 #include "pipeline/cost.h"
 
-/* Those that lie apart are followed, but are no surface. */
-static npg_status drop_isolated(npg_point_set *set, const npg_frame *frame)
+/* No surface is made of what lies apart in its frame, nor of what stands where most frames look through: that was
+ * carried there by a wrong motion.  frame: of the points, NULL: they are those of all frames. */
+static npg_status drop_unsound(npg_point_set *set, const npg_frame *frame)
 {
     uint8_t *keep;
-    if (!frame->isolated) return NPG_OK;
+    if (frame && !frame->isolated) return NPG_OK;
     NPG_TRY(npg_alloc(&keep, NPG_FOR_MESH, set->count));
     for (size_t i = 0; i < set->count; i++)
-        keep[i] = !frame->isolated[npg_spread_index(i, set->count, frame->point_count)];
+        keep[i] = frame ? !frame->isolated[npg_spread_index(i, set->count, frame->point_count)]
+                        : npg_cube_set_value(set->empty, set->points + 3 * i) <= NPG_MAJORITY;
     set->count = npg_points_keep(set->points, set->normals, set->count, keep);
     npg_release(&keep);
     return NPG_OK;
@@ -30,22 +32,8 @@ static npg_status take_frame(npg_point_set *set, npg_worker *worker, const npg_f
     NPG_TRY(npg_alloc_array(&set->points, NPG_FOR_MESH, set->count, 3 * sizeof(float)));
     if (frame->normals) NPG_TRY(npg_alloc_array(&set->normals, NPG_FOR_MESH, set->count, 3 * sizeof(float)));
     npg_points_spread(set->points, set->normals, set->count, frame->pos_local, frame->normals, n);
-    NPG_TRY(drop_isolated(set, frame));
+    NPG_TRY(drop_unsound(set, frame));
     npg_box_local_to_unit(&npg_worker_facts(worker)->box, set->points, set->points, set->count);
-    return NPG_OK;
-}
-
-/* What stands where most frames look through was carried there by a wrong motion. */
-static npg_status drop_empty(npg_point_set *set, npg_worker *worker)
-{
-    uint8_t *keep;
-    NPG_TRY(npg_alloc(&keep, NPG_FOR_MESH, set->count));
-    for (size_t i = 0; i < set->count; i++)
-        keep[i] = npg_cube_set_value(set->empty, set->points + 3 * i) <= NPG_MAJORITY;
-    size_t kept = npg_points_keep(set->points, set->normals, set->count, keep);
-    npg_release(&keep);
-    npg_mesh_note_count(worker, "points_in_empty_space", set->count - kept);
-    set->count = kept;
     return NPG_OK;
 }
 
@@ -61,7 +49,9 @@ static npg_status take_fused(npg_point_set *set, npg_worker *worker, npg_fused *
     fused->points = fused->normals = NULL;
     if (!fused->empty) return NPG_OK;
     NPG_TRY(npg_cube_set_open(&set->empty, fused->empty, fused->empty_count, fused->empty_side));
-    return npg_worker_facts(worker)->brief.is_side ? drop_empty(set, worker) : NPG_OK;
+    if (npg_worker_facts(worker)->brief.is_side) NPG_TRY(drop_unsound(set, NULL));
+    npg_mesh_note_count(worker, "points_in_empty_space", set->given - set->count);
+    return NPG_OK;
 }
 
 static npg_status measure(npg_point_set *set, npg_worker *worker)

@@ -163,8 +163,8 @@ static void go_on(npg_reference_loop *loop, const npg_pass_result *result)
     bool is_whole_now =
         loop->unreached_before ? !result->unreached_count : result->is_side && !brief->is_side;
     bool gains = result->is_side && has_gained(loop, result);
-    bool reaches_more = is_more(result, loop->unreached_before, result->unreached_count);
-    loop->stands_still = result->is_side && result->has_images && !gains && !reaches_more;
+    loop->stands_still = result->is_side && result->has_images && !gains &&
+                         !is_more(result, loop->unreached_before, result->unreached_count);
     grow(loop, result->unreached_count);
     loop->unreached_before = result->unreached_count;
     brief->rounds_left -= !brief->leaves_open && !is_whole_now && !gains;
