@@ -111,8 +111,8 @@ static const npg_pass_result *settle_key(npg_reference_loop *loop)
 
 /* ---- a side that has grown ---- */
 
-/* The last pass of a keyframe whose surface is a side of the body has ended.  Where too few frames are good it lacks
- * what no growth gave it, and another keyframe, that shows what fails, is grown in its place.  The one that fails least
+/* A keyframe whose surface is a side of the body has grown, or stands still.  Where too few frames are good it lacks what
+ * no growth gave it, and another keyframe, that shows what fails, is grown in its place.  The one that fails least
  * is taken in the end: where it is one before, its passes are walked once more (their poses lie in the job's store). */
 static void compare_grown(npg_reference_loop *loop, const npg_pass_result *result)
 {
