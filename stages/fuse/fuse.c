@@ -107,8 +107,7 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
         const npg_skinned *p = &c->warped[i];
         bool is_near = (double)p->dist <= near_dist;
         double share = (double)p->dist / near_dist, robust = 1 / (1 + share * share);
-        /* The reference lies as the keyframe shows the body, whatever the other frames' motion says: what was carried
-         * to where the keyframe saw that nothing is would be a limb for the second time. */
+        /* What was carried to where the keyframe saw that nothing is would be a limb for the second time. */
         if ((c->isolated && c->isolated[i]) || npg_free_space_is_empty(s->key_space, p->point)) {
             s->strays++;
             continue;

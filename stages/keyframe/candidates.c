@@ -118,12 +118,6 @@ static bool gives_way(const npg_candidate *scored, const npg_candidate *least, b
            (!is_side && npg_judged_clearly(&least->judgement, &scored->judgement));
 }
 
-static size_t least_of(const npg_candidate *list, size_t count, size_t scored, bool is_side)
-{
-    size_t first = scored < count ? scored : 0, least = least_but(list, count, count);
-    return least < count && gives_way(&list[first], &list[least], is_side) ? least : first;
-}
-
 /* Parts that touch in one frame are joined in its surface, which is a handle more, and what a hole cuts off is a piece
  * more. */
 static int64_t flaws(const npg_candidate *one)
@@ -134,7 +128,9 @@ static int64_t flaws(const npg_candidate *one)
 /* Of those that points can't tell apart the one of fewest flaws; a side is cut by what stands before it. */
 size_t npg_candidates_best(const npg_candidate *list, size_t count, size_t scored, bool is_side)
 {
-    size_t least = least_of(list, count, scored, is_side), best = least;
+    size_t least = least_but(list, count, count), first = scored < count ? scored : 0;
+    if (least == count || !gives_way(&list[first], &list[least], is_side)) least = first;
+    size_t best = least;
     for (size_t i = 0; i < count && list[least].is_followed && !is_side; i++) {
         const npg_candidate *one = &list[i], *so_far = &list[best];
         bool is_as_good = one->is_followed && !npg_judged_worse(&one->judgement, &list[least].judgement);

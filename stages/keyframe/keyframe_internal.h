@@ -107,8 +107,7 @@ void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, c
 /* Whether no frame of the choice is in fewer pieces than this one. */
 bool npg_candidates_is_whole(const npg_choice *choice, const uint8_t *pieces, int64_t index);
 
-/* Place in the list of the one to take; scored: of the frame by score, count: it is none of them; is_side: they
- * are what one depth camera sees. */
+/* Place in the list of the one to take; scored: of the frame by score, count: none; is_side: of one depth camera. */
 size_t npg_candidates_best(const npg_candidate *list, size_t count, size_t scored, bool is_side);
 
 /* Try the candidates among the clouds.  *count: how many; *best: place in the list of the one to take;

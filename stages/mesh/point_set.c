@@ -49,7 +49,8 @@ static npg_status take_fused(npg_point_set *set, npg_worker *worker, npg_fused *
     fused->points = fused->normals = NULL;
     if (!fused->empty) return NPG_OK;
     NPG_TRY(npg_cube_set_open(&set->empty, fused->empty, fused->empty_count, fused->empty_side));
-    if (npg_worker_facts(worker)->brief.is_side) NPG_TRY(drop_unsound(set, NULL));
+    if (!npg_worker_facts(worker)->brief.is_side) return NPG_OK;
+    NPG_TRY(drop_unsound(set, NULL));
     npg_mesh_note_count(worker, "points_in_empty_space", set->given - set->count);
     return NPG_OK;
 }

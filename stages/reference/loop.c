@@ -59,11 +59,11 @@ static bool keeps_last(const npg_reference_loop *loop)
     return loop->kept == loop->tried_count - 1;
 }
 
-static bool was_tried(const npg_reference_loop *loop, int64_t key)
+bool npg_reference_is_new(const npg_reference_loop *loop, int64_t key)
 {
     size_t i = 0;
     while (i < loop->tried_count && loop->tried[i].key != key) i++;
-    return i < loop->tried_count;
+    return key >= 0 && key != loop->brief.key && i == loop->tried_count;
 }
 
 /* Count what the keyframe of the pass that ended came to; its last word is the one that counts. */
@@ -79,8 +79,8 @@ static void note(npg_reference_loop *loop, const npg_pass_result *result)
 /* Of those counted none is without fault, and one is left that may be. */
 static bool may_try(const npg_reference_loop *loop, int64_t next)
 {
-    return loop->tried[loop->kept].bad_count && loop->tried_count <= loop->attempts && next >= 0 &&
-           !was_tried(loop, next);
+    return loop->tried[loop->kept].bad_count && loop->tried_count <= loop->attempts &&
+           npg_reference_is_new(loop, next);
 }
 
 /* Whether another keyframe is to be followed before anything is made of the pass that ended.  A side of the body
@@ -155,16 +155,16 @@ static void end_taken_back(npg_brief *brief)
     brief->rounds_left = 0;
 }
 
-/* How the keyframe that is settled on goes on after a pass. */
-static void go_on(npg_reference_loop *loop, const npg_pass_result *result)
+/* How the keyframe that is settled on goes on after a pass.  true: a side stands still, with nothing gained. */
+static bool go_on(npg_reference_loop *loop, const npg_pass_result *result)
 {
     npg_brief *brief = &loop->brief;
     /* What a side has taken from past its border was not followed yet: what other frames see through shows then. */
     bool is_whole_now =
         loop->unreached_before ? !result->unreached_count : result->is_side && !brief->is_side;
     bool gains = result->is_side && has_gained(loop, result);
-    loop->stands_still = result->is_side && result->has_images && !gains &&
-                         !is_more(result, loop->unreached_before, result->unreached_count);
+    bool stands_still = result->is_side && result->has_images && !gains &&
+                        !is_more(result, loop->unreached_before, result->unreached_count);
     grow(loop, result->unreached_count);
     loop->unreached_before = result->unreached_count;
     brief->rounds_left -= !brief->leaves_open && !is_whole_now && !gains;
@@ -184,6 +184,7 @@ static void go_on(npg_reference_loop *loop, const npg_pass_result *result)
         brief->rounds_left++;
     }
     if (result->is_side && result->has_images && !brief->rounds_left && !brief->is_best) take_back(brief);
+    return stands_still;
 }
 
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result)
@@ -198,12 +199,12 @@ npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *re
     if (tries_another(loop, result)) return *brief;
     if (!loop->is_settled) result = settle_key(loop);
     brief->is_attempt = false;
+    bool is_over = result->has_no_surface;
     if (brief->takes_back)
         end_taken_back(brief);
-    else if (!result->has_no_surface)
-        go_on(loop, result);
-    if (result->is_side && (!brief->rounds_left || result->has_no_surface || loop->stands_still))
-        compare_grown(loop, result);
+    else if (!is_over)
+        is_over = go_on(loop, result);
+    if (result->is_side && (!brief->rounds_left || is_over)) compare_grown(loop, result);
     return *brief;
 }
 

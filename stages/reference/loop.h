@@ -47,7 +47,6 @@ typedef struct npg_reference_loop {
     int64_t grown;            /* passes that a side of the body has grown through   */
     int64_t unreached_before; /* of the pass before ...                             */
     int64_t in_vain;          /* ... and passes in a row that reached no more since */
-    bool stands_still;        /* the last one left no fewer frames below the bar, and reached no more */
     bool is_limited;          /* the pass to come is for what it explains alone     */
     int64_t bad_least;        /* the fewest frames that failed in a pass with a side of the keyframe */
 } npg_reference_loop;
@@ -65,6 +64,9 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t a
  * from past its border by a side that reaches all, is gathered once more: the last frames that were reached had nothing
  * around them yet, and what others see through there shows when it is followed. */
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result);
+
+/* Whether there is such a keyframe, and it was not tried yet. */
+bool npg_reference_is_new(const npg_reference_loop *loop, int64_t key);
 
 /* The brief where another keyframe could do better before any pass has shown it. */
 npg_brief npg_reference_doubt(npg_reference_loop *loop);
