@@ -80,13 +80,28 @@ static void close_end(int *fd)
     *fd = -1;
 }
 
+/* Ours, and behind it, so that the user's own is found first: a thread of OpenMP's that waits for another one sleeps.
+ * Where the cores are shared with other work, spinning costs more than the second thread gains, and the runtime reads
+ * this while it is loaded, before any code of the helper. */
+static npg_status make_environment(char ***made)
+{
+    static char waits[] = "OMP_WAIT_POLICY=passive"; /* and the end of the list, which is zero */
+    size_t count = 0;
+    while (environ && environ[count]) count++;
+    NPG_TRY(npg_alloc_array(made, NPG_FOR_RUN, count + 2, sizeof **made));
+    if (count) memcpy(*made, environ, count * sizeof **made);
+    (*made)[count] = waits;
+    return NPG_OK;
+}
+
 /* Signals that the host blocks or ignores must not change what the child does. */
 static npg_status spawn(child *c, const char *path, int in, int out, int err)
 {
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
     sigset_t none, all;
-    char parent[24], *arguments[] = {(char *)(uintptr_t)path, parent, NULL};
+    char parent[24], *arguments[] = {(char *)(uintptr_t)path, parent, NULL}, **environment;
+    NPG_TRY(make_environment(&environment));
     snprintf(parent, sizeof parent, "%ld", (long)getpid());
     posix_spawn_file_actions_init(&actions);
     posix_spawnattr_init(&attributes);
@@ -99,9 +114,10 @@ static npg_status spawn(child *c, const char *path, int in, int out, int err)
     posix_spawnattr_setsigmask(&attributes, &none);
     posix_spawnattr_setsigdefault(&attributes, &all);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    int error = posix_spawn(&c->pid, path, &actions, &attributes, arguments, environ);
+    int error = posix_spawn(&c->pid, path, &actions, &attributes, arguments, environment);
     posix_spawn_file_actions_destroy(&actions);
     posix_spawnattr_destroy(&attributes);
+    npg_release(&environment);
     errno = error;
     return error ? npg_error_errno(NPG_FAILED, "can't start %s", path) : NPG_OK;
 }

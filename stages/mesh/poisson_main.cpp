@@ -82,14 +82,7 @@ pcl::PointCloud<pcl::PointNormal>::Ptr read_cloud(const npg_poisson_request &req
         if (!read_all(STDIN_FILENO, rows.data(), now * 6 * sizeof(float))) return nullptr;
         for (uint64_t i = 0; i < now; i++) {
             const float *row = &rows[6 * i];
-            pcl::PointNormal p;
-            p.x = row[0];
-            p.y = row[1];
-            p.z = row[2];
-            p.normal_x = row[3];
-            p.normal_y = row[4];
-            p.normal_z = row[5];
-            cloud->push_back(p);
+            cloud->emplace_back(row[0], row[1], row[2], row[3], row[4], row[5]);
         }
         done += now;
     }
@@ -225,22 +218,11 @@ int guarded(int out)
     }
 }
 
-// A thread that waits for the other one sleeps: where the cores are shared with other work, spinning costs
-// more than the second thread gains.  The OpenMP runtime reads this when it is loaded, so the program starts
-// once more.
-void wait_asleep(char **argv)
-{
-    const char *name = "OMP_WAIT_POLICY";
-    if (std::getenv(name) || setenv(name, "passive", 1)) return;
-    execv("/proc/self/exe", argv);
-}
-
 } // namespace
 
 int main(int, char **argv)
 {
     npg_end_with_parent(argv[1], SIGKILL); // before all else
-    wait_asleep(argv);
     // What libraries print must not get between the bytes of the answer.
     int out = dup(STDOUT_FILENO);
     dup2(STDERR_FILENO, STDOUT_FILENO);
