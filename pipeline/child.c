@@ -80,17 +80,17 @@ static void close_end(int *fd)
     *fd = -1;
 }
 
-/* Ours, and behind it, so that the user's own is found first: a thread of OpenMP's that waits for another one sleeps.
- * Where the cores are shared with other work, spinning costs more than the second thread gains, and the runtime reads
- * this while it is loaded, before any code of the helper. */
+/* Ours, and unless the user says otherwise a thread of OpenMP's that waits for another one sleeps: where the cores are
+ * shared with other work, spinning costs more than the second thread gains.  The runtime reads this while it is loaded,
+ * before any code of the helper. */
 static npg_status make_environment(char ***made)
 {
-    static char waits[] = "OMP_WAIT_POLICY=passive"; /* and the end of the list, which is zero */
+    static char waits[] = "OMP_WAIT_POLICY=passive";
     size_t count = 0;
     while (environ && environ[count]) count++;
-    NPG_TRY(npg_alloc_array(made, NPG_FOR_RUN, count + 2, sizeof **made));
+    NPG_TRY(npg_alloc_array(made, NPG_FOR_RUN, count + 2, sizeof **made)); /* it ends with zero */
     if (count) memcpy(*made, environ, count * sizeof **made);
-    (*made)[count] = waits;
+    if (!getenv("OMP_WAIT_POLICY")) (*made)[count] = waits;
     return NPG_OK;
 }
 

@@ -167,6 +167,30 @@ static void children_end_in_every_way(void **state)
     close_temp_folder(&folder);
 }
 
+static void expect_wait_policy(const temp_folder *folder, const char *expected)
+{
+    npg_child_result result;
+    assert_int_equal(run_script(&result, folder, "printf %s \"$OMP_WAIT_POLICY$NPG_TEST_SEEN\"", 20, "", 0),
+                     NPG_OK);
+    assert_int_equal(result.output_size, strlen(expected));
+    assert_memory_equal(result.output, expected, strlen(expected));
+    npg_release(&result.output);
+}
+
+static void threads_of_a_child_wait_asleep(void **state)
+{
+    (void)state;
+    temp_folder folder;
+    assert_int_equal(open_temp_folder(&folder), 0);
+    unsetenv("OMP_WAIT_POLICY");
+    setenv("NPG_TEST_SEEN", ", seen", 1);
+    expect_wait_policy(&folder, "passive, seen");
+    setenv("OMP_WAIT_POLICY", "active", 1);
+    expect_wait_policy(&folder, "active, seen");
+    unsetenv("OMP_WAIT_POLICY");
+    close_temp_folder(&folder);
+}
+
 static void answers_that_are_not_whole_are_refused(void **state)
 {
     (void)state;
@@ -527,6 +551,7 @@ int main(void)
         cmocka_unit_test(the_same_mesh_every_time),
         cmocka_unit_test(bad_clouds_are_refused),
         cmocka_unit_test(children_end_in_every_way),
+        cmocka_unit_test(threads_of_a_child_wait_asleep),
         cmocka_unit_test(answers_that_are_not_whole_are_refused),
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
         cmocka_unit_test(the_memory_limit_holds),
