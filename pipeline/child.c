@@ -80,9 +80,9 @@ static void close_end(int *fd)
     *fd = -1;
 }
 
-/* Ours, and unless the user says otherwise a thread of OpenMP's that waits for another one sleeps: where the cores are
- * shared with other work, spinning costs more than the second thread gains.  The runtime reads this while it is loaded,
- * before any code of the helper. */
+/* Our environment, and that a thread of OpenMP's which waits for another one sleeps, unless the user says otherwise: where
+ * the cores are shared with other work, spinning costs more than the second thread gains.  The runtime reads this while
+ * it is loaded, before any code of the helper. */
 static npg_status make_environment(char ***made)
 {
     static char waits[] = "OMP_WAIT_POLICY=passive";

@@ -13,7 +13,8 @@
 typedef struct npg_child_job {
     /* name of the helper, "neupig-poisson", or an absolute path; started with our process id as its argument, for
      * npg_end_with_parent(); a name is looked for beside this program and
-     * this library, in their ../libexec/neupig (or ../../libexec/neupig), and where it was to be installed */
+     * this library, in their ../libexec/neupig (or ../../libexec/neupig), and where it was to be installed; its
+     * environment is this process's, with OMP_WAIT_POLICY=passive where that has none */
     const char *program;
     const void *input[2]; /* written one after the other, then standard input is closed */
     size_t input_size[2];
@@ -45,7 +46,7 @@ bool npg_find_installed(char path[4096], const char *folder, const char *name);
 /* ---- for the helper ---- */
 
 /* From now on the signal comes when the parent ends; it comes at once where that has ended before, so that it is not
- * the parent any more.  parent: its process id as text; NULL does nothing.  Lasts over exec. */
+ * the parent any more.  parent: its process id as text; NULL does nothing. */
 static inline void npg_end_with_parent(const char *parent, int signal)
 {
     if (!parent) return;
