@@ -17,7 +17,7 @@ import neupig
 from neupig import _library
 
 WORK = pathlib.Path(sys.argv.pop(1))
-SMALL = dict(epochs=6, faces=600, poisson_depth=6, bars="residual=100,coverage=0,flipped=100")
+SMALL = dict(epochs=6, faces=600, poisson_depth=4, bars="residual=100,coverage=0,flipped=100")
 
 
 def ball(frame, count=900):
@@ -38,7 +38,7 @@ class Files(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.capture = neupig.synth(WORK / "capture", frames=4, points=1500, noise=0.1, outliers=0.5, normals=False)
+        cls.capture = neupig.synth(WORK / "capture", frames=4, points=900, noise=0.1, outliers=0.5, normals=False)
         cls.told = []
         cls.outcome = neupig.run(cls.capture.points, WORK / "out", progress=cls.told.append, **SMALL)
 
@@ -63,7 +63,7 @@ class Files(unittest.TestCase):
         figures = neupig.eval(WORK / "out", self.capture.truth, samples=2000)
         self.assertEqual(figures["frames"], 4)
         self.assertLess(figures["CD"], 500)
-        self.assertEqual(neupig.probe(self.capture.points)["points"]["total"], 6000)
+        self.assertEqual(neupig.probe(self.capture.points)["points"]["total"], 3600)
         folder = neupig.apply(WORK / "out", WORK / "out" / "reference.ply", WORK / "carried")
         self.assertEqual(len(list(folder.glob("frame_*.ply"))), 4)
         self.assertEqual(neupig.export(WORK / "out", ["npz", "pc2"]), 3)

@@ -2,7 +2,7 @@
 
 load ../support/store
 
-small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
+small=(--method '{"epochs": 10, "poisson-depth": 4, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
     --keyframe 5 --bars residual=100,lost=100,coverage=0,flipped=100,stretched=100,invented=100)
 
 setup_file() {

@@ -1,7 +1,7 @@
 # A body that turns before one sensor: the reference grows from the side that the keyframe
 # saw to the whole body, whose vertices turn with it.
 
-small=(--faces 3000 --method '{"align-nodes": 200, "poisson-depth": 7}' --no-outliers --quiet --keyframe 6
+small=(--faces 3000 --method '{"align-nodes": 200, "poisson-depth": 6}' --no-outliers --quiet --keyframe 6
     --bars residual=100,coverage=0,flipped=100,stretched=100,unsupported=100,invented=100)
 
 setup_file() {

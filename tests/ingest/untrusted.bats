@@ -1,6 +1,6 @@
 # A folder of unknown origin: nothing outside the job is read or written, nothing hangs.
 
-small=(--method '{"epochs": 2, "poisson-depth": 5}' --faces 200 --quiet
+small=(--method '{"epochs": 2, "poisson-depth": 4}' --faces 200 --quiet
     --bars residual=100,coverage=0,flipped=100,stretched=100)
 
 setup_file() {

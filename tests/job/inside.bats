@@ -3,7 +3,7 @@
 
 load ../support/store
 
-small=(--method '{"width-1": 32, "width-2": 32, "poisson-depth": 5, "grid-levels": 3}' --faces 400
+small=(--method '{"width-1": 32, "width-2": 32, "poisson-depth": 4, "grid-levels": 3}' --faces 400
     --bars residual=100,coverage=0,flipped=100,stretched=100 --quiet)
 joint=(--method '{"align": false, "window": 0, "epochs": 1200}')
 warm=(--method '{"align": false, "window": 5, "overlap": 2, "epochs": 3000}')

@@ -17,7 +17,7 @@ options=("$@")
 if [ -z "$capture" ]; then
     capture=$folder/capture/points
     "$neupig-bodies" --body bar --frames "$frames" --points 800 -o "$folder/capture" >"$folder/synth.log" || exit 1
-    options=(--method '{"epochs": 12, "poisson-depth": 6, "window": 8, "overlap": 2,
+    options=(--method '{"epochs": 12, "poisson-depth": 4, "window": 8, "overlap": 2,
                         "align-nodes": 60}' --faces 600
     --bars residual=100,coverage=0 "${options[@]}")
 fi

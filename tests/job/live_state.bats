@@ -3,7 +3,7 @@
 
 load ../support/store
 
-small=(--method '{"epochs": 2, "poisson-depth": 6, "align-nodes": 40,
+small=(--method '{"epochs": 2, "poisson-depth": 4, "align-nodes": 40,
                   "align-steps": 6}' --faces 300 --quiet --bars residual=100,coverage=0,stretched=100,flipped=100)
 open=(--method '{"window": 4, "overlap": 1}' --look-ahead 6 --follow-end 0)
 
@@ -180,7 +180,7 @@ check_killed() {
     unshare -rm true 2>/dev/null || skip "no file systems can be mounted here"
     mkdir -p disk
     NEUPIG=$NEUPIG size=$(du -sk whole | cut -f1) unshare -rm bash -ec '
-        mount -t tmpfs -o size=$((3 * size / 4))k none disk
+        mount -t tmpfs -o size=$((4 * size / 5))k none disk
         status=0
         "$NEUPIG" run --follow all -o disk/full "$@" 2>disk.log || status=$?
         cat disk.log

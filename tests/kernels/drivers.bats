@@ -32,7 +32,7 @@ expect_device_failure() { # WORDS COMMAND...
     shim=$(dirname "$NEUPIG")/fault_shim.so
     [ -e "$shim" ] || skip "not under a sanitizer"
     run env LD_PRELOAD="$shim" NPG_FAULT_DRIVER="out of luck" "$NEUPIG" run capture/points -o aligned --faces 200 \
-        --method '{"poisson-depth": 5}' --quiet
+        --method '{"poisson-depth": 4}' --quiet
     echo "$output"
     [ "$status" -eq 0 ] || [ "$status" -eq 7 ]
     [ -e aligned/done.json ]

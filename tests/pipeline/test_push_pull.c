@@ -41,7 +41,7 @@ static void make_ball(double *points, float *normals, int64_t frame)
 static npg_options *open_options(void)
 {
     const char *const settings[][2] = {{"pull", "yes"},        {"epochs", "40"}, {"faces", "600"},
-                                       {"poisson-depth", "6"}, {"output", ""},   {"bars.residual", "5"},
+                                       {"poisson-depth", "4"}, {"output", ""},   {"bars.residual", "5"},
                                        {"keyframe", "12"}};
     npg_options *options;
     assert_int_equal(npg_options_open(&options), NPG_OK);

@@ -53,7 +53,7 @@ needs_shim() {
 @test "a clock that jumps an hour to and fro changes nothing" {
     needs_shim
     "$NEUPIG-bodies" --body bar --frames 3 --points 400 -o capture >synth.log
-    small=(--method '{"epochs": 2, "poisson-depth": 5, "window": 2, "overlap": 1}' --faces 200 --quiet
+    small=(--method '{"epochs": 2, "poisson-depth": 4, "window": 2, "overlap": 1}' --faces 200 --quiet
         --bars residual=100,coverage=0,flipped=100,stretched=100)
     "$NEUPIG" run capture/points -o plain "${small[@]}"
     LD_PRELOAD=$shim NPG_FAULT_CLOCK=3600 timeout 60 "$NEUPIG" run capture/points -o jumps "${small[@]}"

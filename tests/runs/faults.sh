@@ -14,7 +14,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder"
 export XDG_CACHE_HOME=${XDG_CACHE_HOME:-$HOME/.cache}
-small=(epochs 2 faces 200 poisson-depth 5 align-nodes 30 align-steps 3
+small=(epochs 2 faces 200 poisson-depth 4 align-nodes 30 align-steps 3
     bars residual=100,flipped=100,stretched=100,coverage=0 window 3 overlap 1)
 bad=0
 

@@ -1,6 +1,6 @@
 # Live captures through the command: standard input and a folder that grows, longer than the look-ahead.
 
-small=(--method '{"epochs": 2, "poisson-depth": 6, "window": 4, "overlap": 1,
+small=(--method '{"epochs": 2, "poisson-depth": 4, "window": 4, "overlap": 1,
                   "align-nodes": 60}' --faces 300 --quiet --bars residual=100,lost=100,coverage=0,stretched=100,flipped=100
        --look-ahead 6)
 
@@ -149,7 +149,7 @@ await() {
     "$NEUPIG-bodies" --body bar --frames 12 --points 600 -o loop >loop.log
     for times in 1 5; do # there and back, so that nothing leaps
         for i in $(seq $times); do cat loop/points/*.ply $(ls -r loop/points/*.ply); done |
-            "$NEUPIG" run - -o "long$times" "${small[@]}" --method '{"epochs": 1, "width-1": 32, "width-2": 32, "grid-levels": 3, "align": false}' >long.log
+            "$NEUPIG" run - -o "long$times" "${small[@]}" --method '{"epochs": 1, "poisson-depth": 6, "width-1": 32, "width-2": 32, "grid-levels": 3, "align": false}' >long.log
     done
     short=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long1/report.json)
     long=$(sed -n 's/.*"memory_peak_bytes": \([0-9]*\).*/\1/p' long5/report.json)

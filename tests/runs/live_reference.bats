@@ -1,6 +1,6 @@
 # The reference of live runs: from all frames of the look-ahead, as from files; killed or stopped on the way.
 
-small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
+small=(--method '{"epochs": 10, "poisson-depth": 4, "window": 5, "overlap": 2, "align-nodes": 60, "align-steps": 10}' --faces 800
     --bars residual=100,lost=100,coverage=0,flipped=100,stretched=100,invented=100)
 open=(--look-ahead 9 --keyframe 5)
 

@@ -1,6 +1,6 @@
 # The whole chain on a small capture: what a run leaves, that it is the same every time, how bad input ends.
 
-small=(--method '{"epochs": 8, "poisson-depth": 7}' --faces 800 --bars flipped=5 --quiet)
+small=(--method '{"epochs": 8, "poisson-depth": 5}' --faces 800 --bars flipped=5 --quiet)
 
 setup_file() {
     cd "$BATS_FILE_TMPDIR"

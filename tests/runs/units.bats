@@ -2,7 +2,7 @@
 
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
-    small=(--method '{"epochs": 2, "poisson-depth": 5}' --faces 300 --quiet
+    small=(--method '{"epochs": 2, "poisson-depth": 4}' --faces 300 --quiet
         --bars residual=100,coverage=0,flipped=100,stretched=100)
 }
 

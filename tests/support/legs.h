@@ -8,7 +8,7 @@
 
 #include "pipeline/chunk.h"
 
-#define LEGS_POINTS 4000
+#define LEGS_POINTS 3000
 
 typedef struct test_capsule {
     double a[3], b[3], radius;

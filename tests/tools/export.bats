@@ -1,6 +1,6 @@
 # export: formats of a run that is done, by the verb, by a run that is asked again, of what apply carries, after append.
 
-small=(--method '{"epochs": 10, "poisson-depth": 5, "window": 5, "overlap": 2,
+small=(--method '{"epochs": 10, "poisson-depth": 4, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6, "vdb-voxel": 0.04}' --faces 400
     --bars residual=100,coverage=0,flipped=100,stretched=100,unsupported=100 --unit cm --up z --fps 24 --quiet)
 forms=obj,ply,pc2,mdd,glb,glb-meshopt,vat,usda,npz,vdb

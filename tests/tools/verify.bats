@@ -8,7 +8,7 @@ setup_file() {
     printf X | dd of=flipped/meshes/frame_0001.ply bs=1 seek=400 conv=notrunc 2>/dev/null
 }
 
-small=(--method '{"epochs": 8, "poisson-depth": 5}' --faces 400 --bars residual=100,coverage=0,flipped=100,stretched=100 --quiet)
+small=(--method '{"epochs": 8, "poisson-depth": 4}' --faces 400 --bars residual=100,coverage=0,flipped=100,stretched=100 --quiet)
 
 setup() {
     cd "$BATS_FILE_TMPDIR"
