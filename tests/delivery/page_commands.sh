@@ -124,7 +124,7 @@ provide_mesh() {
 # Make what the command names and what is not there yet.
 provide() { # COMMAND
     case $1 in *my-capture*) [ -e my-capture ] || synth my-capture --frames 5 --cycles 0.3 --noise 0.1 ;; esac
-    case $1 in *entering/*) [ -e entering ] || neupig-bodies --body two --frames 18 --cell 0.06 --points 600 -o entering >/dev/null ;; esac
+    case $1 in *entering/*) [ -e entering ] || neupig-bodies --body two --frames 18 --cell 0.06 --points 400 --seed 2 -o entering >/dev/null ;; esac
     case $1 in *scan.obj* | *my-model.obj*) provide_mesh ;; esac
     case $1 in
     *captures/* | *night.json* | *dancer* | *horse*)

@@ -40,28 +40,31 @@ def needs_of(file: pathlib.Path) -> dict[str, pathlib.Path]:
     return found
 
 
-def licence_of(library: pathlib.Path) -> tuple[str, bytes]:
-    """Its package and that package's copyright file."""
-    package = ""
-    for path in (library, library.resolve()):
-        for merged in (path, pathlib.Path(str(path).removeprefix("/usr"))):
-            found = subprocess.run(["dpkg-query", "-S", str(merged)], capture_output=True, text=True, check=False).stdout
-            package = package or found.split(":")[0]
-    licence = pathlib.Path("/usr/share/doc") / package / "copyright"
-    if not package or not licence.exists():
-        sys.exit(f"{library}: no licence in /usr/share/doc/{package}")
-    return package, licence.read_bytes()
+def licences_of(libraries: list[pathlib.Path]) -> dict[str, bytes]:
+    """The copyright files of their packages, each by its package's name."""
+    places = {library: [pathlib.Path(str(path).removeprefix(merged)) for path in (library, library.resolve()) for merged in ("", "/usr")]
+              for library in libraries}
+    # One question for all of them: each has dpkg read the lists of all packages.
+    asked = [str(path) for paths in places.values() for path in paths]
+    said = subprocess.run(["dpkg-query", "-S", *asked], capture_output=True, text=True, check=False).stdout
+    package_at = {path: names.split(":")[0] for names, _, path in (line.rpartition(": ") for line in said.splitlines())}
+    found = {}
+    for library, paths in places.items():
+        package = next((package_at[str(path)] for path in paths if str(path) in package_at), "")
+        licence = pathlib.Path("/usr/share/doc") / package / "copyright"
+        if not package or not licence.exists():
+            sys.exit(f"{library}: no licence in /usr/share/doc/{package}")
+        found[f"{package}.txt"] = licence.read_bytes()
+    return found
 
 
 def gather(build: pathlib.Path, folder: pathlib.Path) -> dict[str, bytes]:
     """Copies in `folder`, stripped and pointed at each other; the licences of those that are others'."""
     own = {"libneupig.so.0": build / "libneupig.so.0"} | {name: build / name for name in PROGRAMS}
-    needs, licences = {}, {}
+    needs: dict[str, pathlib.Path] = {}
     for file in own.values():
         needs |= needs_of(file)
-    for library in needs.values():
-        package, text = licence_of(library)
-        licences[f"{package}.txt"] = text
+    licences = licences_of(list(needs.values()))
     for name, file in (needs | own).items():
         copy = folder / name
         shutil.copy(file.resolve(), copy)
