@@ -2,7 +2,7 @@
 # with the documented exit code.  (Folders, headers, frames without a surface: run.bats; lists, selections,
 # standard input: input.bats; checkpoints, disks, jobs: resume.bats; sources that stop: live.bats.)
 
-small=(--method '{"epochs": 4, "poisson-depth": 4}' --faces 600 --quiet
+small=(--method '{"epochs": 4, "poisson-depth": 6}' --faces 600 --quiet
     --bars residual=100,coverage=0,flipped=100,stretched=100)
 
 setup_file() {
@@ -154,21 +154,21 @@ for _ in range(900):
 }
 
 @test "half of a body that no point saw: trimmed and said, kept and below the bar, or closed as asked for" {
+    ! grep -q '^NPG_SANITIZE:STRING=.' "$(dirname "$NEUPIG")/CMakeCache.txt" || skip "about the verdict: the release build's"
     mkdir half
     for n in 0 1 2; do
         awk '$1 == "v" && $4 > 0.02 { print $2, $3, $4 }' "$points/frame_000$n.obj" >half/frame_000$n.xyz
     done
-    local seen=("${small[@]}" --bars residual=100,lost=100,coverage=0 --method '{"poisson-depth": 5}' --sensor 0,0,10)
-    run "$NEUPIG" run half -o trimmed "${seen[@]}"
+    run "$NEUPIG" run half -o trimmed --bars residual=100,lost=100,coverage=0 "${small[@]}" --sensor 0,0,10
     echo "$output"
     [ "$status" -eq 0 ]
     grep -q 'unseen in all frames, trimmed off' trimmed/report.json
-    run "$NEUPIG" run half -o kept --unseen keep "${seen[@]}"
+    run "$NEUPIG" run half -o kept --unseen keep --bars residual=100,lost=100,coverage=0 "${small[@]}" --sensor 0,0,10
     echo "$output"
     [ "$status" -eq 7 ]
     [[ "$output" == *"surface is invented"* ]]
     grep -q '"exit_code": 7' kept/done.json
-    run "$NEUPIG" run half -o closed --unseen close "${seen[@]}"
+    run "$NEUPIG" run half -o closed --unseen close --bars residual=100,lost=100,coverage=0 "${small[@]}" --sensor 0,0,10
     echo "$output"
     [ "$status" -eq 0 ]
     grep -q 'a back that nobody saw closes it' closed/report.json
