@@ -111,15 +111,16 @@ static const npg_pass_result *settle_key(npg_reference_loop *loop)
 
 /* ---- a side that has grown ---- */
 
-/* A keyframe whose surface is a side of the body has grown, or stands still.  Where too few frames are good it lacks what
- * no growth gave it, and another keyframe, that shows what fails, is grown in its place.  The one that fails least
- * is taken in the end: where it is one before, its passes are walked once more (their poses lie in the job's store). */
+/* A keyframe whose surface is a side of the body has grown, or stands still.  Where frames fail even with the best that it
+ * came to, it lacks what no growth gave it, and another keyframe, that shows what fails, is grown in its place.  The one
+ * that fails least is taken in the end: where it is one before, its passes are walked once more (their poses lie in the
+ * job's store). */
 static void compare_grown(npg_reference_loop *loop, const npg_pass_result *result)
 {
     if (loop->is_taken_back) return;
     note(loop, result);
-    int64_t good = result->frame_count - loop->tried[loop->kept].bad_count;
-    bool tries = may_try(loop, result->next) && (double)good < NPG_MOST * (double)result->frame_count;
+    bool fails = is_more(result, loop->tried[loop->kept].bad_count, 0) && is_more(result, loop->bad_least, 0);
+    bool tries = fails && may_try(loop, result->next);
     if (!tries && keeps_last(loop)) return;
     loop->is_taken_back = !tries;
     begin_with(loop, tries ? result->next : loop->tried[loop->kept].key); /* from its own surface */

@@ -59,10 +59,10 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t a
  * silence the alarm: where the reference does not explain all frames, those that it explains are followed once
  * more and gathered alone, if there are three.  A side of the body grows until all frames are reached, or two passes in a row
  * that ask for the least have reached no more, and for as long as each pass leaves fewer of them below the bar; one
- * that has grown for the worse is taken back to its best.  Where many frames fail in the end, or a pass gains nothing
- * and images can tell, another keyframe is grown, and the one that fails least is taken.  What has grown, or been taken
- * from past its border by a side that reaches all, is gathered once more: the last frames that were reached had nothing
- * around them yet, and what others see through there shows when it is followed. */
+ * that has grown for the worse is taken back to its best.  Where more than a few frames fail in the end, or when a
+ * pass gains nothing and images can tell, another keyframe is grown, and the one that fails least is taken.  What has
+ * grown, or been taken from past its border by a side that reaches all, is gathered once more: the last frames that
+ * were reached had nothing around them yet, and what others see through there shows when it is followed. */
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result);
 
 /* Whether there is such a keyframe, and it was not tried yet. */

@@ -185,8 +185,11 @@ static void a_side_that_fails_is_grown_from_another_keyframe(void **state)
         assert_int_equal(brief.rounds_left, 0);
     }
     npg_reference_begin(&loop, 1, 1);
-    fails(&loop, 5, 20, false);
-    assert_false(fails(&loop, 5, 20, false).is_attempt); /* where most frames are good it takes too long */
+    fails(&loop, 5, 3, false);
+    assert_true(fails(&loop, 5, 3, false).is_attempt);
+    npg_reference_begin(&loop, 1, 1);
+    fails(&loop, 5, 2, false);
+    assert_false(fails(&loop, 5, 2, false).is_attempt); /* a few */
 }
 
 static void growth_that_stands_still_makes_room_for_another_keyframe(void **state)
@@ -206,6 +209,9 @@ static void growth_that_stands_still_makes_room_for_another_keyframe(void **stat
     brief = fails(&loop, 5, 40, true);
     assert_true(brief.rounds_left && !brief.is_attempt); /* now it goes on to its end */
     assert_int_equal(brief.key, 5);
+    npg_reference_begin(&loop, 1, 1);
+    fails(&loop, 5, 0, true);
+    assert_false(fails(&loop, 5, 9, true).is_attempt); /* it is taken back to where none failed */
 }
 
 static void a_keyframe_without_a_side_is_given_up(void **state)
