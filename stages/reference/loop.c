@@ -111,16 +111,15 @@ static const npg_pass_result *settle_key(npg_reference_loop *loop)
 
 /* ---- a side that has grown ---- */
 
-/* A keyframe whose surface is a side of the body has grown, or stands still.  Where frames fail even with the best that it
- * came to, it lacks what no growth gave it, and another keyframe, that shows what fails, is grown in its place.  The one
- * that fails least is taken in the end: where it is one before, its passes are walked once more (their poses lie in the
- * job's store). */
+/* A keyframe whose surface is a side of the body has grown, or stands still.  Where frames fail even with the best that
+ * it came to, it lacks what no growth gave it, and another, that shows what fails, is grown in its place.  The one that
+ * fails least is taken in the end: where it is one before, its passes are walked once more (their poses are stored). */
 static void compare_grown(npg_reference_loop *loop, const npg_pass_result *result)
 {
     if (loop->is_taken_back) return;
     note(loop, result);
-    bool fails = is_more(result, loop->tried[loop->kept].bad_count, 0) && is_more(result, loop->bad_least, 0);
-    bool tries = fails && may_try(loop, result->next);
+    bool tries = is_more(result, loop->tried[loop->kept].bad_count, 0) &&
+                 is_more(result, loop->bad_least, 0) && may_try(loop, result->next);
     if (!tries && keeps_last(loop)) return;
     loop->is_taken_back = !tries;
     begin_with(loop, tries ? result->next : loop->tried[loop->kept].key); /* from its own surface */

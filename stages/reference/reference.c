@@ -105,7 +105,7 @@ static int64_t find_next(const npg_worker *worker, const npg_pass_result *result
     bool is_by_worst = facts->unfit_count && (result->is_side || !result->has_changed);
     if (!clouds || !facts->choice.is_open || (!result->has_changed && !facts->unfit_count)) return -1;
     if ((double)result->bad_count > NPG_MAJORITY * (double)facts->planned_count &&
-        (!result->is_side || npg_reference_is_new(npg_worker_kept(worker), facts->choice.second)))
+        npg_reference_is_new(npg_worker_kept(worker), facts->choice.second))
         return facts->choice.second;
     if (is_by_worst) first = 0, end = facts->planned_count, twice = 2 * facts->unfit_worst;
     for (size_t i = 0; i < clouds->count; i++) {

@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <string>
+#include <type_traits>
 
 extern "C" {
 #include "job/vdb_file.h"
@@ -29,16 +30,6 @@ std::string name_of(const npg_level &level, int at, int channel)
     std::snprintf(text, sizeof text, "%s_L%02d_c%02d", level.kind == NPG_LEVEL_NORMAL ? "normal" : "position",
                   at, channel);
     return text;
-}
-
-// A node's values from the first of a grid's channels on.
-void take(const float *from, float &to)
-{
-    to = from[0];
-}
-void take(const float *from, openvdb::Vec3s &to)
-{
-    to = openvdb::Vec3s(from[0], from[1], from[2]);
 }
 
 double unit_step(const npg_level &level)
@@ -87,9 +78,11 @@ void add_grid(npg::vdb_writer &file, const npg_level &level, int at, int channel
     for (int i = 0; i < level.nodes; i++)
         for (int j = 0; j < level.nodes; j++)
             for (int k = 0; k < level.nodes; k++, from += NPG_LATENT_CHANNELS) {
-                typename Grid::ValueType value;
-                take(from, value);
-                accessor.setValueOn(openvdb::Coord(i, j, k), value);
+                openvdb::Coord node(i, j, k);
+                if constexpr (std::is_same_v<Grid, FloatGrid>)
+                    accessor.setValueOn(node, *from);
+                else
+                    accessor.setValueOn(node, openvdb::Vec3s(from));
             }
     describe(*grid, level, at, channel, place);
     file.add(grid);
