@@ -12,12 +12,6 @@ extern "C" {
 #include "geometry/guard.hpp"
 #include "job/vdb_writer.hpp"
 
-// OpenVDB's library has the code of these; to make it here again takes three quarters of this file's compilation.
-extern template class openvdb::Grid<openvdb::FloatTree>;
-extern template class openvdb::Grid<openvdb::Vec3STree>;
-extern template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
-extern template class openvdb::tree::Tree<openvdb::Vec3STree::RootNodeType>;
-
 namespace
 {
 
