@@ -2,7 +2,6 @@
 #include "kernels/motion.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -4,7 +4,6 @@
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 #include <CL/cl_ext.h>
-#include <stdbool.h>
 
 #include "kernels/runtime/device.h"
 #include "pipeline/status.h"

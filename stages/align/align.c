@@ -4,7 +4,6 @@
  * wait until their window is complete: then those that were lost are tried again from what is known around
  * them (recover.c). The aligned positions are where the joint fit starts. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "align/align_internal.h"

@@ -1,7 +1,6 @@
 /* Pose map: the way of a pose from the nodes of one reference to those of another. */
 #include "align/align_internal.h"
 
-#include <math.h>
 #include <string.h>
 
 static npg_status alloc_map(npg_pose_map *map, size_t count, size_t old_count)

@@ -1,6 +1,5 @@
 /* Export: writes every frame's mesh with the same faces, in the capture's own units and axes, and what the
  * run reports about it. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "export/export.h"

@@ -20,7 +20,6 @@
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
 #include "mesh/surface.h"
-#include "pipeline/cost.h"
 #include "pipeline/order.h"
 
 #define SIDE_LEAST   0.25 /* of a cell, in spacings of the keyframe's points */

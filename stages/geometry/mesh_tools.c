@@ -2,7 +2,6 @@
 #include "geometry/geometry.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 void npg_mesh_vertex_normals(float *normals, const float *vert_pos, size_t vert_count, const uint32_t *faces,

@@ -4,7 +4,6 @@
 #include <math.h>
 
 #include "geometry/geometry.h"
-#include "geometry/limits.h"
 #include "mesh/surface.h"
 #include "pipeline/clock.h"
 #include "pipeline/parallel.h"

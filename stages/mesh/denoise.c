@@ -2,7 +2,6 @@
 #include "mesh/mesh_internal.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <string.h>
 
 #include "geometry/geometry.h"

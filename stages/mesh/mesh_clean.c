@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <meshoptimizer.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "geometry/geometry.h"

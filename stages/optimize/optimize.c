@@ -3,8 +3,6 @@
  *
  * Holds the frames of one window, has them fitted by the run's solver (solver.h), writes vertices into each
  * frame and passes on what no later window needs. */
-#include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "geometry/limits.h"

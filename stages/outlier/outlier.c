@@ -5,7 +5,6 @@
  * points each time, and a frame that was kept clean (frame_store.h) is not cleaned again.  Normals are made
  * for the keyframe alone (or all, if asked), and in the choosing pass for the frames that may become it. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "geometry/geometry.h"

@@ -2,7 +2,6 @@
 #ifndef NPG_OUTLIER_INTERNAL_H
 #define NPG_OUTLIER_INTERNAL_H
 
-#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 

@@ -33,22 +33,29 @@ typedef struct npg_pass_result {
 
 #define NPG_ATTEMPTS_MOST 5
 
+/* How far a keyframe has come before a pass. */
+typedef struct npg_reference_walk {
+    npg_brief brief;          /* of the pass */
+    int64_t grown;            /* passes that a side of the body has grown through   */
+    int64_t unreached_before; /* of the pass before ...                             */
+    int64_t in_vain;          /* ... and passes in a row that reached no more since */
+    bool is_limited;          /* the pass is for what the reference explains alone  */
+    int64_t bad_least;        /* the fewest frames that failed in a pass with a side of the keyframe */
+} npg_reference_walk;
+
 /* {0} before npg_reference_begin().  Nothing to close. */
 typedef struct npg_reference_loop {
-    npg_brief brief;                              /* the last one given */
+    npg_reference_walk now;                       /* its brief is the last one given */
+    npg_reference_walk best;                      /* before the pass with the best side of all keyframes */
     npg_pass_result tried[NPG_ATTEMPTS_MOST + 1]; /* what each keyframe came to ...        */
     size_t tried_count, kept;                     /* ... and which is the best so far */
     int64_t rounds;                               /* that each keyframe has, at least */
     size_t attempts;                              /* that may be made after the first */
-    bool is_settled;          /* the keyframe is no longer in question, or only when its side has grown */
-    bool is_taken_back;       /* a side before the last one was the best, and grows once more */
-    bool is_compared;         /* it was chosen among candidates ...    */
-    npg_pass_result trial;    /* ... after the pass that came to this  */
-    int64_t grown;            /* passes that a side of the body has grown through   */
-    int64_t unreached_before; /* of the pass before ...                             */
-    int64_t in_vain;          /* ... and passes in a row that reached no more since */
-    bool is_limited;          /* the pass to come is for what it explains alone     */
-    int64_t bad_least;        /* the fewest frames that failed in a pass with a side of the keyframe */
+    bool is_settled;  /* the keyframe is no longer in question, or only when its side has grown */
+    bool is_key_back; /* a side of a keyframe before the last one was the best, and grows on */
+    bool is_ending;   /* the best side is followed once more, for what frames contradict, and that is all */
+    bool is_compared; /* the keyframe was chosen among candidates ... */
+    npg_pass_result trial; /* ... after the pass that came to this         */
 } npg_reference_loop;
 
 /* The brief of the first pass, of `rounds` that are to gather points, with so many attempts with other keyframes
@@ -60,8 +67,8 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t a
  * more and gathered alone, if there are three.  A side of the body grows until all frames are reached, or two passes in a row
  * that ask for the least have reached no more, and for as long as each pass leaves fewer of them below the bar; one
  * that has grown for the worse is taken back to its best.  Where more than a few frames fail in the end, or when a
- * pass gains nothing and images can tell, another keyframe is grown, and the one that fails least is taken.  What has
- * grown, or been taken from past its border by a side that reaches all, is gathered once more: the last frames that
+ * pass gains nothing and images can tell, another keyframe is grown, and the one whose best fails least goes on from
+ * there.  What has grown, or been taken from past its border by a side that reaches all, is gathered once more: the last frames that
  * were reached had nothing around them yet, and what others see through there shows when it is followed. */
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result);
 

@@ -161,17 +161,17 @@ static void report_attempts(npg_worker *worker, const npg_reference_loop *loop)
     json_object_set_new(npg_worker_report(worker), "attempts", list);
     npg_worker_log(worker, NPG_LOG_INFO, -1, "with this keyframe %lld frames are below the bar: %s",
                    (long long)loop->tried[loop->tried_count - 1].bad_count,
-                   loop->is_taken_back || !loop->brief.keeps_gathered ? "the one before is taken back"
-                   : loop->brief.is_attempt                           ? "another is tried"
-                                                                      : "it is kept");
+                   loop->is_key_back || !loop->now.brief.keeps_gathered ? "the one before is taken back"
+                   : loop->now.brief.is_attempt                         ? "another is tried"
+                                                                        : "it is kept");
 }
 
 static void tell(npg_worker *worker, const npg_reference_loop *loop, const npg_pass_result *result,
                  bool was_open)
 {
-    const npg_brief *brief = &loop->brief;
+    const npg_brief *brief = &loop->now.brief;
     bool was_compared =
-        result->is_side ? brief->is_attempt || (!brief->rounds_left && !loop->is_taken_back) : was_open;
+        result->is_side ? brief->is_attempt || (!brief->rounds_left && !loop->is_key_back) : was_open;
     if (was_compared && (brief->is_attempt || loop->tried_count > 1)) report_attempts(worker, loop);
     if (!brief->is_attempt && !brief->takes_gathered)
         npg_worker_log(worker, NPG_LOG_INFO, -1,
@@ -200,7 +200,7 @@ static npg_status settle_choice(npg_worker *worker, npg_reference_loop *loop)
 {
     const npg_facts *facts = npg_worker_facts(worker);
     bool beatable, was_open = !loop->is_settled;
-    if (loop->brief.compares) {
+    if (loop->now.brief.compares) {
         *npg_own(worker, brief) = npg_reference_compared(loop, facts->plan.key);
         if (loop->tried_count) tell(worker, loop, &loop->trial, was_open);
         return NPG_OK;
@@ -217,12 +217,13 @@ static npg_status settle_pass(npg_worker *worker, npg_reference_loop *loop)
     bool was_open = !loop->is_settled;
     NPG_TRY(result_of(&result, worker));
     *npg_own(worker, brief) = npg_reference_next(loop, &result);
-    json_object_set_new(npg_worker_report(worker), "passes_grown", json_integer((json_int_t)loop->grown));
+    json_object_set_new(npg_worker_report(worker), "passes_grown", json_integer((json_int_t)loop->now.grown));
     if (loop->tried_count) tell(worker, loop, &result, was_open);
     if (result.is_side)
         npg_worker_log(worker, NPG_LOG_INFO, -1, "%lld frames are below the bar with the side so far%s",
                        (long long)result.bad_count,
-                       loop->brief.takes_back ? ": it is taken back to a better one" : "");
+                       loop->is_ending && loop->now.brief.takes_back ? ": it is taken back to a better one"
+                                                                     : "");
     return NPG_OK;
 }
 

@@ -5,7 +5,6 @@
  * (two of them zero), and so are the vectors. */
 #include "track/track_internal.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "geometry/geometry.h"

@@ -1,11 +1,8 @@
 /* Candidate clouds: thinned frames, and following a surface through them. */
 #include "track/track.h"
 
-#include <math.h>
 #include <string.h>
 #include <xxhash.h>
-
-#include "geometry/limits.h"
 
 #define HELD_OUT     5   /* one point of so many */
 #define FLIPPED_MOST 0.1 /* of given normals: beyond, those of other frames are not used */

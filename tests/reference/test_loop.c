@@ -77,14 +77,14 @@ static void a_side_grows_until_all_is_reached_and_is_gathered_once_more(void **s
         brief = next_side(&loop, unreached);
         assert_true(brief.leaves_open && brief.takes_gathered);
         assert_int_equal(brief.rounds_left, 1);
-        assert_int_equal(loop.grown, passes + 1);
+        assert_int_equal(loop.now.grown, passes + 1);
     }
     brief = next_side(&loop, 0); /* whole now, and its newest part has nothing around it */
     assert_false(brief.leaves_open);
     assert_int_equal(brief.rounds_left, 1);
     brief = next_side(&loop, 0);
     assert_int_equal(brief.rounds_left, 0);
-    assert_int_equal(loop.grown, passes);
+    assert_int_equal(loop.now.grown, passes);
     assert_true(brief.takes_gathered);
 }
 
@@ -137,7 +137,7 @@ static void a_side_grows_for_as_long_as_fewer_frames_fail(void **state)
     npg_reference_begin(&loop, 1, 0);
     for (int64_t bad = 60; bad > 3; bad -= 10) {
         assert_int_equal(fails(&loop, 5, bad, false).rounds_left, 1);
-        assert_true(loop.brief.is_best && loop.brief.takes_gathered);
+        assert_true(loop.now.brief.is_best && loop.now.brief.takes_gathered);
     }
     assert_int_equal(fails(&loop, 5, 9, false).rounds_left, 0); /* one less is chance */
     npg_reference_begin(&loop, 1, 0);
@@ -179,8 +179,9 @@ static void a_side_that_fails_is_grown_from_another_keyframe(void **state)
         assert_int_equal(brief.key, is_better ? 3 : 5);
         assert_int_equal(brief.rounds_left, !is_better);
         if (is_better) continue;
-        fails(&loop, 5, 50, false); /* once more as it was, and then it is enough */
-        brief = fails(&loop, 5, 50, false);
+        assert_true(brief.takes_back && brief.is_attempt && !brief.takes_gathered && !brief.takes_poses);
+        brief = fails(&loop, 5, 50, false); /* its last pass once more, and then it is enough */
+        assert_true(brief.takes_gathered && brief.takes_poses && !brief.takes_back);
         assert_int_equal(brief.key, 5);
         assert_int_equal(brief.rounds_left, 0);
     }
@@ -205,13 +206,38 @@ static void growth_that_stands_still_makes_room_for_another_keyframe(void **stat
     assert_false(fails(&loop, 3, 80, true).is_attempt);
     brief = fails(&loop, 3, 80, true); /* nor does the other one gain, and it has more of them */
     assert_int_equal(brief.key, 5);
-    for (int64_t bad = 60; bad >= 40; bad -= 20) fails(&loop, 5, bad, true); /* as before */
+    assert_true(brief.takes_back && !brief.is_best); /* none of the other's is kept */
     brief = fails(&loop, 5, 40, true);
-    assert_true(brief.rounds_left && !brief.is_attempt); /* now it goes on to its end */
+    assert_true(brief.rounds_left && brief.is_last_look && !brief.is_attempt); /* now it goes on to its end */
     assert_int_equal(brief.key, 5);
     npg_reference_begin(&loop, 1, 1);
     fails(&loop, 5, 0, true);
     assert_false(fails(&loop, 5, 9, true).is_attempt); /* it is taken back to where none failed */
+}
+
+static void a_keyframe_is_as_good_as_the_best_that_it_came_to(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 1, 1);
+    fails(&loop, 5, 60, true);
+    fails(&loop, 5, 30, true);
+    assert_true(fails(&loop, 5, 50, true).is_attempt);
+    fails(&loop, 3, 70, true);
+    npg_brief brief = fails(&loop, 3, 40, true);
+    assert_false(brief.is_attempt ||
+                 brief.is_best); /* fewer than with the last of the one before, and it gains */
+    brief = fails(&loop, 3, 41, true);
+    assert_true(brief.takes_back);
+    assert_int_equal(brief.key, 5);
+    brief = fails(&loop, 5, 30, true); /* from its best on as before */
+    assert_true(brief.is_best && !brief.takes_back && brief.takes_gathered);
+    fails(&loop, 5, 50, true);
+    brief = fails(&loop, 5, 50, true);
+    assert_true(brief.takes_back && brief.takes_poses); /* to where 30 failed */
+    brief = fails(&loop, 5, 30, true);
+    assert_true(brief.trims_only && brief.takes_gathered);
+    assert_int_equal(brief.rounds_left, 0);
 }
 
 static void a_keyframe_without_a_side_is_given_up(void **state)
@@ -286,7 +312,7 @@ static void a_frame_that_fails_is_the_next_keyframe(void **state)
     brief = next_of(&loop, 3, 0, -1); /* all is well */
     assert_int_equal(brief.key, 3);
     assert_false(brief.is_attempt);
-    assert_true(brief.takes_gathered && brief.takes_poses && loop.brief.keeps_gathered);
+    assert_true(brief.takes_gathered && brief.takes_poses && loop.now.brief.keeps_gathered);
     assert_int_equal(brief.rounds_left, 0);
 }
 
@@ -346,10 +372,10 @@ static void a_keyframe_that_does_no_better_is_taken_back(void **state)
     next_of(&loop, 5, 4, 3);
     npg_brief brief = next_of(&loop, 3, 9, 7);
     assert_int_equal(brief.key, 7);
-    assert_false(loop.brief.keeps_gathered);
+    assert_false(loop.now.brief.keeps_gathered);
     brief = next_of(&loop, 7, 4, 9); /* there are two attempts, and no better is not enough */
     assert_int_equal(brief.key, 5);
-    assert_false(brief.is_attempt || brief.takes_poses || loop.brief.keeps_gathered);
+    assert_false(brief.is_attempt || brief.takes_poses || loop.now.brief.keeps_gathered);
     assert_true(brief.takes_gathered);
     assert_int_equal(brief.rounds_left, 1); /* as without any attempt */
     brief = next_of(&loop, 5, 4, 3);        /* and it is not in question again */
@@ -389,6 +415,7 @@ int main(void)
         cmocka_unit_test(a_side_that_has_grown_for_the_worse_is_taken_back),
         cmocka_unit_test(a_side_that_fails_is_grown_from_another_keyframe),
         cmocka_unit_test(growth_that_stands_still_makes_room_for_another_keyframe),
+        cmocka_unit_test(a_keyframe_is_as_good_as_the_best_that_it_came_to),
         cmocka_unit_test(a_keyframe_without_a_side_is_given_up),
         cmocka_unit_test(a_whole_body_is_not_trimmed),
         cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),

@@ -1,7 +1,6 @@
 /* Process of one capture: neupig run in a child, its output, and how it is stopped. */
 #include "tools/batch/batch.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>

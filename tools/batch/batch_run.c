@@ -3,8 +3,6 @@
 
 #include <math.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
 
 #include "pipeline/clock.h"
 #include "pipeline/json_file.h"

@@ -9,7 +9,6 @@
 #include <math.h>
 #include <meshoptimizer.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "export/exporters/exporters_internal.h"
