@@ -17,6 +17,7 @@ static void begin_with(npg_reference_loop *loop, int64_t key)
                                                .takes_gathered = true,
                                                .keeps_gathered = true,
                                                .takes_poses = true,
+                                               .is_best = loop->now.brief.is_best, /* of the pass before */
                                                .gathers_from = INT64_MIN,
                                                .gathers_to = INT64_MAX,
                                                .explained_least = NPG_MOST},
@@ -206,9 +207,8 @@ static void end_with_best(npg_reference_loop *loop)
 static npg_brief end(npg_reference_loop *loop)
 {
     npg_brief *brief = &loop->now.brief;
-    brief->takes_back = brief->is_last_look = false;
+    brief->rounds_left = brief->takes_back = brief->is_last_look = false;
     brief->trims_only = brief->takes_gathered = true;
-    brief->rounds_left = 0;
     return *brief;
 }
 

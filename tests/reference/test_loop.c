@@ -172,6 +172,7 @@ static void a_side_that_fails_is_grown_from_another_keyframe(void **state)
         assert_false(fails(&loop, 5, 50, false).is_attempt); /* it may grow to more */
         npg_brief brief = fails(&loop, 5, 50, false);
         assert_true(brief.is_attempt && !brief.takes_gathered && !brief.takes_poses);
+        assert_true(brief.is_best); /* the one that was followed last */
         assert_int_equal(brief.key, 3);
         assert_int_equal(brief.rounds_left, 1);
         assert_false(fails(&loop, 3, bad, false).is_attempt);
@@ -222,7 +223,7 @@ static void a_keyframe_is_as_good_as_the_best_that_it_came_to(void **state)
     npg_reference_begin(&loop, 1, 1);
     fails(&loop, 5, 60, true);
     fails(&loop, 5, 30, true);
-    assert_true(fails(&loop, 5, 50, true).is_attempt);
+    assert_true(fails(&loop, 5, 50, true).is_attempt && !loop.now.brief.is_best);
     fails(&loop, 3, 70, true);
     npg_brief brief = fails(&loop, 3, 40, true);
     assert_false(brief.is_attempt ||
