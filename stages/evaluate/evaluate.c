@@ -100,7 +100,8 @@ static const char *const fault_texts[NPG_FAULTS] = {
 
 /* What is wrong with a frame by itself.  A comparison with NaN fails, as it should, but for the support: there
  * it means that nobody knows which points the reference is of.  Of 95 % of the points good fits of noisy captures keep to
- * the bar on the median, a lost limb and a surface that follows noise are clearly above it. */
+ * the bar on the median, a lost limb and a surface that follows noise are clearly above it.  Images know how far off a
+ * point is missed; of their coarse depths 95 % are off by more. */
 static fault fault_of(const evaluate_state *state, const npg_figures *f, double unseen_share)
 {
     /* Without images only those that are missed in one place tell a limb from noise. */
@@ -108,7 +109,7 @@ static fault fault_of(const evaluate_state *state, const npg_figures *f, double 
     double far = isnan(f->misfits[NPG_MISFIT_FAR].share) ? 0 : f->misfits[NPG_MISFIT_FAR].share;
     const fault kinds[] = {
         {NPG_FAULT_MEDIAN, f->point_dist_median, state->residual_max},
-        {NPG_FAULT_P95, f->point_dist_p95, NPG_CLEARLY * state->residual_max},
+        {NPG_FAULT_P95, has_images ? 0 : f->point_dist_p95, NPG_CLEARLY * state->residual_max},
         {NPG_FAULT_COVERAGE, f->coverage,
          state->coverage_min * (1 - unseen_share)}, /* of what the keyframe saw */
         {NPG_FAULT_FLIPPED, f->flipped_share, state->flipped_max},
@@ -399,8 +400,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
 static const npg_option options[] = {
     /* type                 name                place                   default   least most  shown as or words */
     NPG_PART(REAL,          "bars.residual",    AT(residual_max),       "0.5",    0, 100,  "PERCENT",
-        "most median distance of a frame's points to the surface, in per cent of the figure's diagonal; 95 "
-        "% of them lie within twice that"),
+        "most median distance of a frame's points to the surface, in per cent of the figure's diagonal; "
+        "where no depth images are known, 95 % of them lie within twice that"),
     NPG_PART(REAL,          "bars.coverage",    AT(coverage_min),       "50",     0, 100,  "PERCENT",
         "least share of the surface that the keyframe saw and that is in sight, with points near it, in per "
         "cent. A frame with clearly more of it without points than the best quarter of the frames is bad, too; "

@@ -97,7 +97,7 @@ void npg_measure_close(npg_measure **measure);
  * (npg_shape_measure()), and unless the frame is skipped or has no finite point
  *
  *   point_dist_*       of the points to the surface, in diagonals of the box
- *   vertex_dist_mean   of the vertices to the nearest point, the same
+ *   vertex_dist_mean   of the vertices, in sight where sensors are known, to the nearest point, the same
  *   chamfer            1e5 x half the sum of both mean squares
  *   marks              where eight vertices are, which lie far from each other
  *   coverage           share of the area, in sight where sensors are known, with a point within

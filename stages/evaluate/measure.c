@@ -361,7 +361,7 @@ static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_f
     const npg_mesh *mesh = m->proxy->mesh;
     npg_figures *figures = &frame->figures;
     const float *vert_unit = m->vert_unit;
-    size_t v = mesh->vert_count;
+    size_t v = mesh->vert_count, count = 0;
     NPG_TRY(npg_grow(&m->dists, &m->dists_capacity, v, sizeof *m->dists, NPG_FOR_QUERY));
     NPG_TRY(npg_points_nearest(m->nearest, m->dists, m->points, point_count, vert_unit, v, 1));
     double area = npg_vertex_areas(m->vert_areas, vert_unit, v, mesh->faces, mesh->face_count);
@@ -369,15 +369,17 @@ static npg_status measure_vertices(npg_measure *m, npg_frame *frame, const npg_f
     if (frame->sensor_count) NPG_TRY(find_in_sight(m, frame, box, sqrt(area / (double)point_count)));
     for (size_t i = 0; i < v; i++) {
         double dist_sq = (double)m->dists[i];
+        if (frame->sensor_count && !m->is_in_sight[i]) continue;
+        count++;
         sum_sq += dist_sq;
         sum += sqrt(dist_sq);
-        if (frame->sensor_count && !m->is_in_sight[i]) continue;
         seen += m->vert_areas[i];
         if (dist_sq <= radius * radius) covered += m->vert_areas[i];
     }
+    if (!count) count = 1; /* nothing is in sight, and nothing covered */
     figures->coverage = seen > 0 ? covered / seen : 0;
-    figures->vertex_dist_mean = sum / (double)v * per_unit;
-    *mean_sq = sum_sq / (double)v * per_unit * per_unit;
+    figures->vertex_dist_mean = sum / (double)count * per_unit;
+    *mean_sq = sum_sq / (double)count * per_unit * per_unit;
     NPG_TRY(measure_unsupported(m, figures, box, radius, area));
     NPG_TRY(measure_by_images(m, frame, box, point_count, area));
     npg_misfit_frame found = {.points = m->points,
