@@ -498,6 +498,40 @@ static void the_keyframe_contradicts_what_lies_elsewhere(void **state)
     assert_true(nowhere_of(1, true, false) == 0); /* and of a mesh that was given, too */
 }
 
+/* Of a sphere of which a sensor has seen the half that it can see. */
+static double vertex_dist_of_half(size_t sensor_count)
+{
+    static float points[3 * VERTS];
+    const npg_frame_box box = {.scale = 1, .diagonal = 1};
+    const npg_measure_settings settings = {.cover_dist = 1};
+    float sensor[3] = {0, 0, -9};
+    size_t count = 0;
+    npg_mesh *mesh;
+    npg_measure *measure;
+    assert_int_equal(open_sphere(&mesh), NPG_OK);
+    for (size_t v = 0; v < VERTS; v++)
+        if (mesh->vert_pos[3 * v + 2] < 0.1f) memcpy(points + 3 * count++, mesh->vert_pos + 3 * v, 12);
+    npg_frame frame = {.pos_local = points,
+                       .point_count = count,
+                       .vert_unit = mesh->vert_pos,
+                       .vert_count = VERTS,
+                       .sensor_local = sensor,
+                       .sensor_count = sensor_count};
+    assert_int_equal(npg_mesh_make_normals(mesh), NPG_OK);
+    assert_int_equal(npg_measure_open(&measure, mesh, 0, &settings), NPG_OK);
+    assert_int_equal(npg_measure_frame(measure, &frame, &box), NPG_OK);
+    npg_measure_close(&measure);
+    npg_mesh_unref(&mesh);
+    return frame.figures.vertex_dist_mean;
+}
+
+static void what_no_sensor_can_see_does_not_stand_off(void **state)
+{
+    (void)state;
+    assert_true(vertex_dist_of_half(0) > 0.3);
+    assert_true(vertex_dist_of_half(1) < 0.01);
+}
+
 static void bad_frames_make_a_partial_run(void **state)
 {
     (void)state;
@@ -575,6 +609,7 @@ int main(void)
         cmocka_unit_test(what_another_frame_saw_has_support),
         cmocka_unit_test(a_frames_own_points_support),
         cmocka_unit_test(the_keyframe_contradicts_what_lies_elsewhere),
+        cmocka_unit_test(what_no_sensor_can_see_does_not_stand_off),
         cmocka_unit_test(bad_frames_make_a_partial_run),
         cmocka_unit_test(fewer_points_give_nearly_the_same),
         cmocka_unit_test(a_vertex_that_is_not_finite_is_a_failure),
