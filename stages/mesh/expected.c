@@ -7,7 +7,6 @@
  *
  * is how surely p would have points if it were there.  A web between two feathers faces as their sides do, which were
  * seen; the soles of feet face as little does that was seen. */
-
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
 #include "mesh/mesh_internal.h"

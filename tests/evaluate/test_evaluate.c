@@ -448,13 +448,25 @@ static void a_frames_own_points_support(void **state)
     assert_true(s.figures[1].unsupported_share == 0 && s.figures[1].good);
 }
 
+/* The figures of one frame that is measured by itself; the mesh is let go. */
+static const npg_figures *figures_of(npg_frame *frame, npg_mesh *mesh, const npg_measure_settings *settings)
+{
+    const npg_frame_box box = {.scale = 1, .diagonal = 1};
+    npg_measure *measure;
+    assert_int_equal(npg_mesh_make_normals(mesh), NPG_OK);
+    assert_int_equal(npg_measure_open(&measure, mesh, 0, settings), NPG_OK);
+    assert_int_equal(npg_measure_frame(measure, frame, &box), NPG_OK);
+    npg_measure_close(&measure);
+    npg_mesh_unref(&mesh);
+    return &frame->figures;
+}
+
 /* A reference that its own frame contradicts, though it is moved to where all is right: a sphere that lies beside what the
  * sensor of the keyframe sees. */
 static double nowhere_of(float shift, bool is_key, bool lies_as_key)
 {
     enum { SIDE = 100 };
     static float cells[SIDE * SIDE], points[3 * VERTS];
-    const npg_frame_box box = {.scale = 1, .diagonal = 1};
     const npg_measure_settings settings = {.cover_dist = 1, .lies_as_key = lies_as_key};
     npg_depth_view view = {.to_sensor = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 9},
                            .first = {-0.5, -0.5},
@@ -463,7 +475,6 @@ static double nowhere_of(float shift, bool is_key, bool lies_as_key)
                            .height = SIDE};
     float sensor[3] = {0, 0, -9};
     npg_mesh *mesh;
-    npg_measure *measure;
     assert_int_equal(open_sphere(&mesh), NPG_OK);
     memcpy(points, mesh->vert_pos, sizeof points);
     for (size_t v = 0; v < VERTS; v++) mesh->vert_pos[3 * v] += shift;
@@ -481,12 +492,7 @@ static double nowhere_of(float shift, bool is_key, bool lies_as_key)
                        .views = &view,
                        .view_cells = cells,
                        .view_cell_count = SIDE * SIDE};
-    assert_int_equal(npg_mesh_make_normals(mesh), NPG_OK);
-    assert_int_equal(npg_measure_open(&measure, mesh, 0, &settings), NPG_OK);
-    assert_int_equal(npg_measure_frame(measure, &frame, &box), NPG_OK);
-    npg_measure_close(&measure);
-    npg_mesh_unref(&mesh);
-    return frame.figures.nowhere_share;
+    return figures_of(&frame, mesh, &settings)->nowhere_share;
 }
 
 static void the_keyframe_contradicts_what_lies_elsewhere(void **state)
@@ -502,12 +508,10 @@ static void the_keyframe_contradicts_what_lies_elsewhere(void **state)
 static double vertex_dist_of_half(size_t sensor_count)
 {
     static float points[3 * VERTS];
-    const npg_frame_box box = {.scale = 1, .diagonal = 1};
     const npg_measure_settings settings = {.cover_dist = 1};
     float sensor[3] = {0, 0, -9};
     size_t count = 0;
     npg_mesh *mesh;
-    npg_measure *measure;
     assert_int_equal(open_sphere(&mesh), NPG_OK);
     for (size_t v = 0; v < VERTS; v++)
         if (mesh->vert_pos[3 * v + 2] < 0.1f) memcpy(points + 3 * count++, mesh->vert_pos + 3 * v, 12);
@@ -517,12 +521,7 @@ static double vertex_dist_of_half(size_t sensor_count)
                        .vert_count = VERTS,
                        .sensor_local = sensor,
                        .sensor_count = sensor_count};
-    assert_int_equal(npg_mesh_make_normals(mesh), NPG_OK);
-    assert_int_equal(npg_measure_open(&measure, mesh, 0, &settings), NPG_OK);
-    assert_int_equal(npg_measure_frame(measure, &frame, &box), NPG_OK);
-    npg_measure_close(&measure);
-    npg_mesh_unref(&mesh);
-    return frame.figures.vertex_dist_mean;
+    return figures_of(&frame, mesh, &settings)->vertex_dist_mean;
 }
 
 static void what_no_sensor_can_see_does_not_stand_off(void **state)
