@@ -31,10 +31,10 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t a
     return loop->now.brief;
 }
 
-/* Whether one count of frames is more than the other by more than a few of all. */
+/* Whether one count of frames is more than the other by more than a few of all, which of a short capture is one. */
 static bool is_more(const npg_pass_result *result, int64_t one, int64_t other)
 {
-    return (double)(one - other) > NPG_FEW * (double)result->frame_count;
+    return (double)(one - other) > fmax(1, NPG_FEW * (double)result->frame_count);
 }
 
 /* How a reference that does not reach all frames goes on. */

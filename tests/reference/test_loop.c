@@ -194,6 +194,19 @@ static void a_side_that_fails_is_grown_from_another_keyframe(void **state)
     assert_false(fails(&loop, 5, 2, false).is_attempt); /* a few */
 }
 
+static void one_frame_of_a_short_capture_is_a_few(void **state)
+{
+    (void)state;
+    for (int64_t bad = 1; bad <= 2; bad++) {
+        npg_reference_loop loop;
+        const npg_pass_result side = {
+            .key = 5, .frame_count = 24, .bad_count = bad, .next = 3, .is_side = true, .has_images = true};
+        npg_reference_begin(&loop, 1, 1);
+        npg_reference_next(&loop, &side);
+        assert_int_equal(npg_reference_next(&loop, &side).is_attempt, bad > 1);
+    }
+}
+
 static void growth_that_stands_still_makes_room_for_another_keyframe(void **state)
 {
     (void)state;
@@ -415,6 +428,7 @@ int main(void)
         cmocka_unit_test(a_side_grows_for_as_long_as_fewer_frames_fail),
         cmocka_unit_test(a_side_that_has_grown_for_the_worse_is_taken_back),
         cmocka_unit_test(a_side_that_fails_is_grown_from_another_keyframe),
+        cmocka_unit_test(one_frame_of_a_short_capture_is_a_few),
         cmocka_unit_test(growth_that_stands_still_makes_room_for_another_keyframe),
         cmocka_unit_test(a_keyframe_is_as_good_as_the_best_that_it_came_to),
         cmocka_unit_test(a_keyframe_without_a_side_is_given_up),
