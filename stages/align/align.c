@@ -36,10 +36,7 @@ typedef struct state {
     int64_t unreached_count;      /* frames that a side of the body is not followed to */
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
-    struct figures {
-        double worst_dist, dist_sum;
-        int64_t worst_frame, frames, lost, found;
-    } sum;
+    npg_recover_result sum;       /* of the groups so far */
 } state;
 
 #define AT(member) offsetof(state, member)
@@ -76,11 +73,6 @@ static void uninit(npg_worker *worker)
 static size_t nodes_of(const state *s)
 {
     return npg_tracker_node_count(s->tracker);
-}
-
-static size_t pose_bytes(const state *s)
-{
-    return npg_pose_bytes(nodes_of(s));
 }
 
 static size_t state_bytes(const state *s)
@@ -221,7 +213,7 @@ static npg_status fit_pose(npg_worker *worker, npg_waiting *w, npg_side *at)
                        "coarse alignment: mean distance %.5f, Chamfer %.6f in %d steps",
                        w->tracked.point_dist_mean, w->tracked.chamfer, w->tracked.steps);
     }
-    memcpy(w->pose, at->now, pose_bytes(s));
+    memcpy(w->pose, at->now, npg_pose_bytes(nodes_of(s)));
     at->now_tracked = w->tracked;
     at->has_now = w->cloud.count > 0;
     return NPG_OK;
@@ -334,16 +326,6 @@ static npg_status finish_group(npg_worker *worker)
     return status;
 }
 
-static void add_to_report(state *s, const npg_waiting *w)
-{
-    if (!w->cloud.count) return;
-    s->sum.frames++;
-    s->sum.dist_sum += w->tracked.point_dist_mean;
-    if (w->tracked.point_dist_mean <= s->sum.worst_dist) return;
-    s->sum.worst_dist = w->tracked.point_dist_mean;
-    s->sum.worst_frame = w->frame.number;
-}
-
 static npg_status pass_on(npg_worker *worker, npg_waiting *w)
 {
     state *s = npg_worker_state(worker);
@@ -374,11 +356,9 @@ static npg_status follow_group(npg_worker *worker)
     unsigned char *packed;
     if (!npg_pose_cache_has_group(&s->cache)) {
         NPG_TRY(finish_group(worker));
-        for (size_t i = 0; i < s->group.count; i++) {
-            npg_waiting *w = &s->group.frames[i];
-            add_to_report(s, w);
-            NPG_TRY(npg_pose_cache_put(&s->cache, w->frame.index, w->pose));
-        }
+        const npg_waiting *w = s->group.frames;
+        for (size_t i = 0; i < s->group.count; i++)
+            NPG_TRY(npg_pose_cache_put(&s->cache, w[i].frame.index, w[i].pose));
     }
     NPG_TRY(npg_alloc(&packed, NPG_FOR_FIT, state_bytes(s)));
     npg_status status = NPG_OK;
@@ -455,10 +435,6 @@ static npg_status flush(npg_worker *worker)
     report_progress(worker);
     NPG_TRY(npg_pose_cache_leave(&s->cache, worker, &s->tracker));
     if (npg_worker_pass(worker) == NPG_PASS_FUSE) *npg_own(worker, unreached_count) = s->unreached_count;
-    if (!s->sum.frames) return NPG_OK;
-    json_object_set_new(report, "mean_distance_unit", json_real(s->sum.dist_sum / (double)s->sum.frames));
-    json_object_set_new(report, "worst_distance_unit", json_real(s->sum.worst_dist));
-    json_object_set_new(report, "worst_frame", json_integer(s->sum.worst_frame));
     json_object_set_new(report, "frames_lost", json_integer(s->sum.lost));
     json_object_set_new(report, "frames_found_again", json_integer(s->sum.found));
     return NPG_OK;

@@ -19,7 +19,7 @@
  *        moved to where the body stands in this frame (rigid_icp.c), as it seldom recurs in place
  *     2  the poses of the frame before it and of the one after it, moved likewise
  *     3  the motion of the two frames before it, and of the two after it, taken on
- *     4  the poses of the frame before it and of the one after it
+ *     4  the poses of the frame before it and of the one after it, once others were found
  *
  * and the pose of the least cost (track.h) stays.  What is found helps the frames around it, so this is
  * repeated until none is found.  Before depth images a frame is lost when more of its points, or of the surface, is

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <xxhash.h>
 
 #include "geometry/limits.h"
 #include "pipeline/order.h"
@@ -50,14 +51,17 @@ static npg_status attempt(const attempts *a, bool *taken, npg_recover_frame *fra
                           const npg_prior_poses *poses, double share)
 {
     size_t nodes = npg_tracker_node_count(a->tracker), bytes = npg_pose_bytes(nodes);
+    npg_tracker_effort effort = from->effort ? *from->effort : npg_tracker_usual(a->tracker);
     npg_tracked tracked;
+    effort.cost_best = fmax(share, 1) * frame->tracked.cost;
+    effort.cost_most = share * frame->tracked.cost;
     *taken = false;
     if (a->should_stop && a->should_stop(a->user)) return npg_error(NPG_STOPPED, "stopped while %s", a->what);
     if (from->before)
         npg_pose_extrapolate(a->trial, from->now, from->before, nodes);
     else
         memcpy(a->trial, from->now, bytes);
-    NPG_TRY(npg_tracker_fit(a->tracker, &tracked, a->trial, &frame->cloud, poses, from->effort));
+    NPG_TRY(npg_tracker_fit(a->tracker, &tracked, a->trial, &frame->cloud, poses, &effort));
     if (tracked.cost > share * frame->tracked.cost) return NPG_OK;
     *taken = true;
     frame->tracked = tracked;
@@ -75,10 +79,13 @@ typedef struct recovery {
     double apart; /* and what holes, which differ in all frames, do not come to; infinite: too few frames */
     double point_level; /* the points' part of the distance, of the best quarter */
     double usual_count; /* of points, median */
+    size_t known_count; /* frames              */
     double *sorted;     /* count, scratch          */
     npg_look *looks;    /* count; closed with the recovery             */
     double *moved;      /* MOVED_MOST x K x 12, scratch                */
     size_t *lost;       /* count: which are lost                       */
+    uint64_t *tried;    /* keys of starts: of all sweeps               */
+    size_t tried_count;
     npg_recover_result *result;
 } recovery;
 
@@ -107,30 +114,28 @@ static bool is_lost(const recovery *r, const npg_recover_frame *frame)
 
 enum figure { CHAMFER, POINTS_PART, POINT_COUNT };
 
-/* Puts a figure of the known frames in order; returns how many there are. */
-static size_t sort(recovery *r, enum figure figure)
+/* What so many quarters of the known frames have at most; 0: there are none. */
+static double quarters_of(recovery *r, enum figure figure, size_t quarters)
 {
-    size_t known = 0;
+    r->known_count = 0;
     for (size_t i = 0; i < r->count; i++) {
         const npg_recover_frame *f = &r->frames[i];
         const double of[] = {f->tracked.chamfer, f->tracked.point_dist_sq, (double)f->cloud.count};
-        if (is_known(f)) r->sorted[known++] = of[figure];
+        if (is_known(f)) r->sorted[r->known_count++] = of[figure];
     }
-    qsort(r->sorted, known, sizeof *r->sorted, npg_order_double);
-    return known;
+    qsort(r->sorted, r->known_count, sizeof *r->sorted, npg_order_double);
+    return r->known_count ? r->sorted[quarters * r->known_count / 4] : 0;
 }
 
 static void set_levels(recovery *r)
 {
-    size_t known = sort(r, CHAMFER);
-    r->level = fmax(LEVEL_LEAST, known ? r->sorted[known / 4] : 0);
-    double middle = fmax(r->level, known ? r->sorted[known / 2] : 0);
-    r->apart =
-        known / 4 < NPG_CONFIRMED ? HUGE_VAL : fmax(MORE * r->level, r->level + APART * (middle - r->level));
-    sort(r, POINTS_PART);
-    r->point_level = known ? r->sorted[known / 4] : 0;
-    sort(r, POINT_COUNT);
-    r->usual_count = known ? r->sorted[known / 2] : 0;
+    r->level = fmax(LEVEL_LEAST, quarters_of(r, CHAMFER, 1));
+    double middle = fmax(r->level, quarters_of(r, CHAMFER, 2));
+    r->apart = r->known_count / 4 < NPG_CONFIRMED
+                   ? HUGE_VAL
+                   : fmax(MORE * r->level, r->level + APART * (middle - r->level));
+    r->point_level = quarters_of(r, POINTS_PART, 1);
+    r->usual_count = quarters_of(r, POINT_COUNT, 2);
 }
 
 /* ---- frames that look alike ---- */
@@ -209,29 +214,30 @@ static npg_status find_starts(starts *s, const recovery *r, size_t i, int sweep)
     NPG_TRY(find_alike(all, &found, r, i));
     for (size_t k = 0; k < found; k++) add_moved(s, r, &all[k], NULL);
     for (int way = -1; way <= 1; way += 2) {
-        const npg_recover_frame *now = frame_at(r, i, way);
+        const npg_recover_frame *now = frame_at(r, i, way), *before = frame_at(r, i, 2 * way);
         if (!now || is_off(r, now)) continue;
         NPG_TRY(compare(&beside, r, (size_t)(now - r->frames), i));
         add_moved(s, r, &beside, &wide);
+        if (before) s->list[s->count++] = (start){now->pose, before->pose, &wide};
     }
-    for (int way = -1; way <= 1; way += 2) {
-        const npg_recover_frame *now = frame_at(r, i, way), *before = frame_at(r, i, 2 * way);
-        if (now && before && !is_off(r, now)) s->list[s->count++] = (start){now->pose, before->pose, &wide};
-    }
-    for (int way = -1; way <= 1; way += 2) {
+    for (int way = -1; way <= 1 && sweep; way += 2) {
         const npg_recover_frame *now = frame_at(r, i, way);
-        if (now && !is_off(r, now)) s->list[s->count++] = (start){now->pose, NULL, sweep ? &wider : &wide};
+        if (now && !is_off(r, now)) s->list[s->count++] = (start){now->pose, NULL, &wider};
     }
     return NPG_OK;
 }
 
-static npg_status try_start(recovery *r, npg_recover_frame *frame, const start *from)
+/* Whether a sweep before has tried it: once more it would end where it ended. */
+static bool was_tried(recovery *r, const npg_recover_frame *frame, const start *from)
 {
-    const npg_prior_poses prior = {.pose = from->now};
-    bool taken;
-    NPG_TRY(attempt(&r->by, &taken, frame, from, &prior, BETTER));
-    r->result->tried++;
-    return NPG_OK;
+    size_t bytes = npg_pose_bytes(npg_tracker_node_count(r->by.tracker)), i = 0;
+    const uint64_t all[] = {(uint64_t)frame->index, from->effort ? (uint64_t)from->effort->steps : 0,
+                            XXH3_64bits(from->now, bytes),
+                            from->before ? XXH3_64bits(from->before, bytes) : 0};
+    uint64_t key = XXH3_64bits(all, sizeof all);
+    while (i < r->tried_count && r->tried[i] != key) i++;
+    r->tried[r->tried_count] = key;
+    return i < r->tried_count++;
 }
 
 static npg_status recover_frame(recovery *r, size_t i, int sweep)
@@ -239,7 +245,13 @@ static npg_status recover_frame(recovery *r, size_t i, int sweep)
     npg_recover_frame *frame = &r->frames[i];
     starts from = {.count = 0};
     NPG_TRY(find_starts(&from, r, i, sweep));
-    for (size_t k = 0; k < from.count && is_off(r, frame); k++) NPG_TRY(try_start(r, frame, &from.list[k]));
+    for (size_t k = 0; k < from.count && is_off(r, frame); k++) {
+        const npg_prior_poses prior = {.pose = from.list[k].now};
+        bool taken;
+        if (was_tried(r, frame, &from.list[k])) continue;
+        NPG_TRY(attempt(&r->by, &taken, frame, &from.list[k], &prior, BETTER));
+        r->result->tried++;
+    }
     return NPG_OK;
 }
 
@@ -266,19 +278,6 @@ static size_t list_lost(recovery *r)
     return count;
 }
 
-static npg_status sweep_once(bool *is_found, recovery *r, size_t lost_count, int sweep)
-{
-    int vain = 0;
-    *is_found = false;
-    for (size_t k = 0; k < lost_count && vain < VAIN_MOST; k++) {
-        NPG_TRY(recover_frame(r, r->lost[k], sweep));
-        bool is_this_found = !is_off(r, &r->frames[r->lost[k]]);
-        vain = is_this_found ? 0 : vain + 1;
-        *is_found |= is_this_found;
-    }
-    return NPG_OK;
-}
-
 /* Of a frame without points, of the group before, its pose says where the body was. */
 static npg_status open_look(npg_look *look, const recovery *r, const npg_recover_frame *frame)
 {
@@ -303,6 +302,7 @@ static npg_status open_recovery(recovery *r, npg_arena *scratch)
     size_t pose_bytes = npg_pose_bytes(npg_tracker_node_count(r->by.tracker));
     r->by.trial = npg_arena_take(scratch, 1, pose_bytes);
     r->moved = npg_arena_take(scratch, MOVED_MOST, pose_bytes);
+    r->tried = npg_arena_take(scratch, r->count * STARTS_MOST * SWEEPS, sizeof *r->tried);
     r->looks = npg_arena_take(scratch, r->count, sizeof *r->looks);
     NPG_TRY(npg_arena_status(scratch));
     for (size_t i = 0; i < r->count; i++) NPG_TRY(open_look(&r->looks[i], r, &r->frames[i]));
@@ -316,7 +316,13 @@ static npg_status run_sweeps(recovery *r)
         set_levels(r);
         size_t lost = list_lost(r);
         if (!sweep) r->result->lost = (int64_t)lost;
-        NPG_TRY(sweep_once(&is_found, r, lost, sweep));
+        is_found = false;
+        for (size_t k = 0, vain = 0; k < lost && vain < VAIN_MOST; k++) {
+            NPG_TRY(recover_frame(r, r->lost[k], sweep));
+            bool is_this_found = !is_off(r, &r->frames[r->lost[k]]);
+            vain = is_this_found ? 0 : vain + 1;
+            is_found |= is_this_found;
+        }
     }
     set_levels(r);
     r->result->found = r->result->lost - (int64_t)list_lost(r);

@@ -10,7 +10,7 @@
 #include "pipeline/file.h"
 
 /* Of the files in the job folder; another one is not read. */
-#define LAYOUT 2
+#define LAYOUT 3
 
 /* Options that change how a run works, not what comes out of it.  The input is compared by its files. */
 static const char *const free_options[] = {"input",  "output", "ring",        "chunk",   "max-memory",

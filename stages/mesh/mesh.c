@@ -277,9 +277,6 @@ static npg_status colour_reference(making *m)
                                      &cloud, m->set.seen_dist);
     npg_release(&points);
     NPG_TRY(status);
-    size_t seen = 0;
-    for (size_t i = 0; i < mesh->vert_count; i++) seen += mesh->vert_colours[4 * i + 3] != 0;
-    npg_mesh_note_count(m->worker, "vertices_coloured", seen);
     return npg_colour_fill(mesh->vert_colours, mesh);
 }
 

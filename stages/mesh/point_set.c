@@ -50,9 +50,7 @@ static npg_status take_fused(npg_point_set *set, npg_worker *worker, npg_fused *
     if (!fused->empty) return NPG_OK;
     NPG_TRY(npg_cube_set_open(&set->empty, fused->empty, fused->empty_count, fused->empty_side));
     if (!npg_worker_facts(worker)->brief.is_side) return NPG_OK;
-    NPG_TRY(drop_unsound(set, NULL));
-    npg_mesh_note_count(worker, "points_in_empty_space", set->given - set->count);
-    return NPG_OK;
+    return drop_unsound(set, NULL);
 }
 
 static npg_status measure(npg_point_set *set, npg_worker *worker)

@@ -265,7 +265,12 @@ typedef struct npg_tracker_effort {
     double stiffness;  /* of the first step, in final stiffnesses          */
     double width_unit; /* of the first step's robust weight: what may move */
     double along;      /* times the share of distances along the surface   */
+    double cost_best;  /* that is to be bettered ...                        */
+    double cost_most;  /* ... by coming to this, or it is given up; 0: it never is */
 } npg_tracker_effort;
+
+/* Of a fit that starts where the motion so far leads to. */
+npg_tracker_effort npg_tracker_usual(const npg_tracker *tracker);
 
 /* Of a fit that starts from what a pass before found: near the usual one's end, in half of the steps. */
 npg_tracker_effort npg_tracker_again(const npg_tracker *tracker);

@@ -631,15 +631,28 @@ static npg_status do_step(step *s, npg_tracked *tracked, double *pose)
     return NPG_OK;
 }
 
+npg_tracker_effort npg_tracker_usual(const npg_tracker *t)
+{
+    return (npg_tracker_effort){t->settings.steps, STIFF_START, WIDTH_START, 1, 0, 0};
+}
+
 npg_tracker_effort npg_tracker_again(const npg_tracker *t)
 {
-    return (npg_tracker_effort){(t->settings.steps + 1) / 2, AGAIN, AGAIN * WIDTH_END, 1};
+    return (npg_tracker_effort){(t->settings.steps + 1) / 2, AGAIN, AGAIN * WIDTH_END, 1, 0, 0};
+}
+
+/* A fit that settles gains less with each step: one that does not better what it is to, and would not come to what it
+ * is to at the pace of its last step, never will. */
+static bool is_given_up(const npg_tracked *tracked, double cost_before, const npg_tracker_effort *effort)
+{
+    double end = tracked->cost + (tracked->cost - cost_before) * (effort->steps - tracked->steps);
+    return effort->cost_most > 0 && tracked->cost > effort->cost_best && end > effort->cost_most;
 }
 
 npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, const npg_tracker_cloud *cloud,
                            const npg_prior_poses *poses, const npg_tracker_effort *effort)
 {
-    const npg_tracker_effort usual = {t->settings.steps, STIFF_START, WIDTH_START, 1};
+    const npg_tracker_effort usual = npg_tracker_usual(t);
     npg_kdtree *tree;
     NPG_REQUIRE(cloud->count);
     t->target_count = npg_points_spread(t->targets, t->target_normals, t->settings.samples, cloud->points,
@@ -654,9 +667,11 @@ npg_status npg_tracker_fit(npg_tracker *t, npg_tracked *tracked, double *pose, c
     if (cloud->sensor_count) npg_prior_take(&t->prior, t->graph, poses ? poses : &start);
     t->along = fmin(1, t->settings.along * effort->along);
     while (tracked->steps < effort->steps && !status) {
+        double cost_before = tracked->cost;
         set_schedule(&s, tracked, effort);
         status = do_step(&s, tracked, pose);
-        if (s.is_settling && tracked->change < NPG_SETTLED * t->graph->radius) break;
+        bool is_over = tracked->change < NPG_SETTLED * t->graph->radius;
+        if (s.is_settling && (is_over || is_given_up(tracked, cost_before, effort))) break;
     }
     if (!status && cloud->space)
         tracked->astray += npg_free_space_lost_share(cloud->space, t->targets, t->hits, t->target_count);

@@ -18,6 +18,7 @@ static void assert_all_are_found(capture *c, const double *before, int lost)
     assert_int_equal(npg_recover(c->tracker, &result, c->frames, FRAMES, NULL, NULL), NPG_OK);
     print_message("%d lost, %d found in %d fits\n", (int)result.lost, (int)result.found, (int)result.tried);
     assert_int_equal(result.lost, lost);
+    assert_true(result.tried <= 16); /* 18 to 20 where what has not changed is tried again */
     for (int t = 0; t < FRAMES; t++) {
         print_message("frame %d: %.2g, first %.2g\n", t, c->frames[t].tracked.chamfer, before[t]);
         assert_true(c->frames[t].tracked.chamfer < 2 * before[t]);
@@ -149,6 +150,13 @@ static void what_images_call_astray_is_lost(void **state)
     close_capture(&c);
 }
 
+/* What no pose of a ball explains. */
+static void scatter(capture *c, int t)
+{
+    for (int i = 0; i < 3 * VERTS; i++)
+        c->points[t][i] = (float)((i * 7919 + t * 104729) % 2003) / 1001.5f - 1;
+}
+
 static void attempts_end(void **state)
 {
     static capture c;
@@ -157,8 +165,7 @@ static void attempts_end(void **state)
     open_capture(&c);
     for (int t = 0; t < FRAMES;
          t++) { /* what no pose of a ball explains, and what one frame claims to explain */
-        for (int i = 0; i < 3 * VERTS; i++)
-            c.points[t][i] = (float)((i * 7919 + t * 104729) % 2003) / 1001.5f - 1;
+        scatter(&c, t);
         c.frames[t].tracked.cost = c.frames[t].tracked.chamfer = t > 4 ? 1e-5 : 1e-3;
         c.frames[t].tracked.point_dist_sq = c.frames[t].tracked.chamfer / 2;
     }
@@ -170,6 +177,32 @@ static void attempts_end(void **state)
     close_capture(&c);
 }
 
+static void a_fit_that_will_not_do_is_given_up(void **state)
+{
+    static capture c;
+    npg_tracked whole, given_up, enough;
+    double *pose;
+    (void)state;
+    open_capture(&c);
+    scatter(&c, 3);
+    npg_tracker_effort effort = npg_tracker_usual(c.tracker);
+    assert_int_equal(npg_alloc_array(&pose, NPG_FOR_RUN, c.size, sizeof *pose), NPG_OK);
+    npg_tracked *tracked[] = {&whole, &given_up, &enough};
+    for (int way = 0; way < 3; way++) {
+        memcpy(pose, c.poses, c.size * sizeof *pose);
+        if (way) effort.cost_best = effort.cost_most = way == 1 ? whole.cost / 2 : 2 * whole.cost;
+        assert_int_equal(
+            npg_tracker_fit(c.tracker, tracked[way], pose, &c.frames[3].cloud, NULL, way ? &effort : NULL),
+            NPG_OK);
+    }
+    print_message("%d steps, %d until it is given up\n", whole.steps, given_up.steps);
+    assert_true(given_up.steps < whole.steps && 3 * given_up.steps >= 2 * ball_settings.steps);
+    assert_true(given_up.cost > whole.cost / 2);
+    assert_memory_equal(&enough, &whole, sizeof whole);
+    npg_release(&pose);
+    close_capture(&c);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(lost_frames_are_found_from_those_around),
@@ -178,6 +211,7 @@ int main(void)
                                        cmocka_unit_test(what_is_found_is_left_alone),
                                        cmocka_unit_test(surface_without_points_is_lost_among_alike),
                                        cmocka_unit_test(what_images_call_astray_is_lost),
+                                       cmocka_unit_test(a_fit_that_will_not_do_is_given_up),
                                        cmocka_unit_test(attempts_end)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
