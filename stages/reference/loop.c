@@ -4,7 +4,6 @@
 
 #include <math.h>
 
-#define GROW_PASSES 40 /* at most */
 /* Share of a frame's points that must have a place on a surface that grows: a frame that sees much more is
  * wrongly followed, and adds limbs where they are not.  In the end half, in steps, after passes that reached no
  * more frames. */
@@ -45,7 +44,7 @@ static void grow(npg_reference_walk *now, int64_t unreached)
     bool asks_less = !has_gained && brief->explained_least > NPG_MAJORITY + EXPLAINED_STEP / 2;
     if (asks_less) brief->explained_least = fmax(brief->explained_least - EXPLAINED_STEP, NPG_MAJORITY);
     now->in_vain = has_gained || asks_less ? 0 : now->in_vain + 1;
-    brief->leaves_open = unreached && now->in_vain < 2 && now->grown < GROW_PASSES;
+    brief->leaves_open = unreached && now->in_vain < 2 && now->grown < NPG_GROWN_MOST;
     now->grown += unreached > 0;
     now->unreached_before = unreached;
     brief->was_open = now->grown > 0;
@@ -161,10 +160,20 @@ static bool has_gained(npg_reference_loop *loop, const npg_pass_result *result)
                          (kept->key == now->brief.key || least < kept->bad_count);
     if (now->brief.is_best) loop->best = *now;
     now->bad_least = least;
+    if (now->passes < NPG_GROWN_MOST) now->bad_after[now->passes++] = least;
     return gains && is_more(result, result->bad_count, 0);
 }
 
-/* How the keyframe that is settled on goes on after a pass.  true: a side stands still, with nothing gained. */
+/* Whether another keyframe than the best is behind where that was after as many passes: growth builds on what it has. */
+static bool is_behind(const npg_reference_loop *loop, const npg_pass_result *result)
+{
+    const npg_pass_result *kept = &loop->tried[loop->kept];
+    int64_t last = loop->now.passes - 1;
+    int64_t least = last < loop->best.passes ? loop->best.bad_after[last] : kept->bad_count;
+    return !loop->is_key_back && result->key != kept->key && is_more(result, loop->now.bad_least, least);
+}
+
+/* How the keyframe that is settled on goes on after a pass.  true: a side stands still, with nothing gained, or is behind. */
 static bool go_on(npg_reference_loop *loop, const npg_pass_result *result)
 {
     npg_reference_walk *now = &loop->now;
@@ -172,8 +181,9 @@ static bool go_on(npg_reference_loop *loop, const npg_pass_result *result)
     /* What a side has taken from past its border was not followed yet: what other frames see through shows then. */
     bool is_whole_now = now->unreached_before ? !result->unreached_count : result->is_side && !brief->is_side;
     bool gains = result->is_side && has_gained(loop, result);
-    bool stands_still = result->is_side && result->has_images && !gains &&
-                        !is_more(result, now->unreached_before, result->unreached_count);
+    bool stands_still =
+        result->has_images && !gains && !is_more(result, now->unreached_before, result->unreached_count);
+    bool is_over = result->is_side && (stands_still || is_behind(loop, result));
     grow(now, result->unreached_count);
     brief->takes_back = false;
     brief->rounds_left -= !brief->leaves_open && !is_whole_now && !gains;
@@ -192,7 +202,7 @@ static bool go_on(npg_reference_loop *loop, const npg_pass_result *result)
         brief->gathers_to = result->explained_to;
         brief->rounds_left++;
     }
-    return stands_still;
+    return is_over;
 }
 
 /* The last one that a side has grown to does worse than one before, which is the reference then ... */

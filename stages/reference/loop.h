@@ -32,6 +32,7 @@ typedef struct npg_pass_result {
 } npg_pass_result;
 
 #define NPG_ATTEMPTS_MOST 5
+#define NPG_GROWN_MOST    40 /* passes that a side of the body grows through */
 
 /* How far a keyframe has come before a pass. */
 typedef struct npg_reference_walk {
@@ -41,6 +42,7 @@ typedef struct npg_reference_walk {
     int64_t in_vain;          /* ... and passes in a row that reached no more since */
     bool is_limited;          /* the pass is for what the reference explains alone  */
     int64_t bad_least;        /* the fewest frames that failed in a pass with a side of the keyframe */
+    int64_t passes, bad_after[NPG_GROWN_MOST]; /* and after each of them */
 } npg_reference_walk;
 
 /* {0} before npg_reference_begin().  Nothing to close. */
@@ -67,9 +69,10 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t a
  * more and gathered alone, if there are three.  A side of the body grows until all frames are reached, or two passes in a row
  * that ask for the least have reached no more, and for as long as each pass leaves fewer of them below the bar; one
  * that has grown for the worse is taken back to its best.  Where more than a few frames fail in the end, or when a
- * pass gains nothing and images can tell, another keyframe is grown, and the one whose best fails least goes on from
- * there.  What has grown, or been taken from past its border by a side that reaches all, is gathered once more: the last
- * frames that were reached had nothing around them yet, and what others see through there shows when it is followed. */
+ * pass gains nothing and images can tell, another keyframe is grown, for as long as it is not behind what the best had
+ * come to in as many passes, and the one whose best fails least goes on from there.  What has grown, or been taken
+ * from past its border by a side that reaches all, is gathered once more: the last frames that were reached had nothing
+ * around them yet, and what others see through there shows when it is followed. */
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result);
 
 /* Whether there is such a keyframe, and it was not tried yet. */
