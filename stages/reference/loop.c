@@ -164,13 +164,14 @@ static bool has_gained(npg_reference_loop *loop, const npg_pass_result *result)
     return gains && is_more(result, result->bad_count, 0);
 }
 
-/* Whether another keyframe than the best is behind where that was after as many passes: growth builds on what it has. */
+/* Whether another keyframe than the best is behind where that was a pass earlier: growth builds on what it has. */
 static bool is_behind(const npg_reference_loop *loop, const npg_pass_result *result)
 {
     const npg_pass_result *kept = &loop->tried[loop->kept];
-    int64_t last = loop->now.passes - 1;
-    int64_t least = last < loop->best.passes ? loop->best.bad_after[last] : kept->bad_count;
-    return !loop->is_key_back && result->key != kept->key && is_more(result, loop->now.bad_least, least);
+    int64_t then = loop->now.passes - 2;
+    int64_t least = then < loop->best.passes ? loop->best.bad_after[then < 0 ? 0 : then] : kept->bad_count;
+    return then >= 0 && !loop->is_key_back && result->key != kept->key &&
+           is_more(result, loop->now.bad_least, least);
 }
 
 /* How the keyframe that is settled on goes on after a pass.  true: a side stands still, with nothing gained, or is behind. */

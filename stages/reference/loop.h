@@ -70,7 +70,7 @@ npg_brief npg_reference_begin(npg_reference_loop *loop, int64_t rounds, size_t a
  * that ask for the least have reached no more, and for as long as each pass leaves fewer of them below the bar; one
  * that has grown for the worse is taken back to its best.  Where more than a few frames fail in the end, or when a
  * pass gains nothing and images can tell, another keyframe is grown, for as long as it is not behind what the best had
- * come to in as many passes, and the one whose best fails least goes on from there.  What has grown, or been taken
+ * come to in a pass less, and the one whose best fails least goes on from there.  What has grown, or been taken
  * from past its border by a side that reaches all, is gathered once more: the last frames that were reached had nothing
  * around them yet, and what others see through there shows when it is followed. */
 npg_brief npg_reference_next(npg_reference_loop *loop, const npg_pass_result *result);

@@ -175,8 +175,8 @@ static void a_side_that_fails_is_grown_from_another_keyframe(void **state)
         assert_true(brief.is_best); /* the one that was followed last */
         assert_int_equal(brief.key, 3);
         assert_int_equal(brief.rounds_left, 1);
-        if (is_better) assert_false(fails(&loop, 3, bad, false).is_attempt);
-        brief = fails(&loop, 3, bad, false); /* with more it is given up at once */
+        assert_false(fails(&loop, 3, bad, false).is_attempt);
+        brief = fails(&loop, 3, bad, false);
         assert_int_equal(brief.key, is_better ? 3 : 5);
         assert_int_equal(brief.rounds_left, !is_better);
         if (is_better) continue;
@@ -217,8 +217,8 @@ static void growth_that_stands_still_makes_room_for_another_keyframe(void **stat
     npg_brief brief = fails(&loop, 5, 40, true);
     assert_true(brief.is_attempt && !brief.takes_poses); /* not looked at once more before */
     assert_int_equal(brief.key, 3);
-    assert_false(fails(&loop, 3, 60, true).is_attempt); /* as many as with the first after one pass ... */
-    brief = fails(&loop, 3, 50, true);                  /* ... and more than that had after two */
+    assert_false(fails(&loop, 3, 80, true).is_attempt);
+    brief = fails(&loop, 3, 80, true); /* nor does the other one gain, and it has more of them */
     assert_int_equal(brief.key, 5);
     assert_true(brief.takes_back && !brief.is_best); /* none of the other's is kept */
     brief = fails(&loop, 5, 40, true);
@@ -237,8 +237,11 @@ static void a_keyframe_is_as_good_as_the_best_that_it_came_to(void **state)
     fails(&loop, 5, 60, true);
     fails(&loop, 5, 30, true);
     assert_true(fails(&loop, 5, 50, true).is_attempt && !loop.now.brief.is_best);
-    assert_false(fails(&loop, 3, 60, true).is_attempt);
-    npg_brief brief = fails(&loop, 3, 40, true); /* fewer than with the last of the one before: 50 */
+    fails(&loop, 3, 70, true);
+    npg_brief brief = fails(&loop, 3, 40, true);
+    assert_false(brief.is_attempt ||
+                 brief.is_best); /* fewer than with the last of the one before, and it gains */
+    brief = fails(&loop, 3, 41, true);
     assert_true(brief.takes_back);
     assert_int_equal(brief.key, 5);
     brief = fails(&loop, 5, 30, true); /* from its best on as before */
@@ -249,6 +252,20 @@ static void a_keyframe_is_as_good_as_the_best_that_it_came_to(void **state)
     brief = fails(&loop, 5, 30, true);
     assert_true(brief.trims_only && brief.takes_gathered);
     assert_int_equal(brief.rounds_left, 0);
+}
+
+static void a_keyframe_that_is_behind_is_given_up(void **state)
+{
+    (void)state;
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, 1, 1);
+    for (int64_t bad = 70; bad > 20; bad -= 20) fails(&loop, 5, bad, true);
+    assert_true(fails(&loop, 5, 30, true).is_attempt);
+    assert_false(fails(&loop, 3, 90, true).takes_back); /* which may come in a pass ... */
+    assert_false(fails(&loop, 3, 70, true).takes_back); /* ... where the first was a pass earlier */
+    npg_brief brief = fails(&loop, 3, 60, true);        /* it gains, and had to come to 50 */
+    assert_true(brief.takes_back);
+    assert_int_equal(brief.key, 5);
 }
 
 static void a_keyframe_without_a_side_is_given_up(void **state)
@@ -428,6 +445,7 @@ int main(void)
         cmocka_unit_test(one_frame_of_a_short_capture_is_a_few),
         cmocka_unit_test(growth_that_stands_still_makes_room_for_another_keyframe),
         cmocka_unit_test(a_keyframe_is_as_good_as_the_best_that_it_came_to),
+        cmocka_unit_test(a_keyframe_that_is_behind_is_given_up),
         cmocka_unit_test(a_keyframe_without_a_side_is_given_up),
         cmocka_unit_test(a_whole_body_is_not_trimmed),
         cmocka_unit_test(growth_in_vain_asks_for_less_and_then_ends),
