@@ -36,7 +36,7 @@ typedef struct state {
     int64_t unreached_count;      /* frames that a side of the body is not followed to */
     int64_t read;                 /* frames of the plan so far                           */
     int64_t window_at, closes_at; /* of an open plan: the next window, and when it is complete */
-    npg_recover_result sum;       /* of the groups so far */
+    npg_recover_result sum;       /* lost and found, of the groups so far */
 } state;
 
 #define AT(member) offsetof(state, member)

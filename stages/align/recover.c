@@ -74,18 +74,16 @@ static npg_status attempt(const attempts *a, bool *taken, npg_recover_frame *fra
 typedef struct recovery {
     attempts by;
     npg_recover_frame *frames;
-    size_t count;
+    size_t count, tried_count;
     double level; /* Chamfer distance of the best quarter */
     double apart; /* and what holes, which differ in all frames, do not come to; infinite: too few frames */
     double point_level; /* the points' part of the distance, of the best quarter */
     double usual_count; /* of points, median */
-    size_t known_count; /* frames              */
     double *sorted;     /* count, scratch          */
     npg_look *looks;    /* count; closed with the recovery             */
     double *moved;      /* MOVED_MOST x K x 12, scratch                */
     size_t *lost;       /* count: which are lost                       */
     uint64_t *tried;    /* keys of starts: of all sweeps               */
-    size_t tried_count;
     npg_recover_result *result;
 } recovery;
 
@@ -114,28 +112,30 @@ static bool is_lost(const recovery *r, const npg_recover_frame *frame)
 
 enum figure { CHAMFER, POINTS_PART, POINT_COUNT };
 
-/* What so many quarters of the known frames have at most; 0: there are none. */
-static double quarters_of(recovery *r, enum figure figure, size_t quarters)
+/* Puts a figure of the known frames in order; returns how many there are. */
+static size_t sort(recovery *r, enum figure figure)
 {
-    r->known_count = 0;
+    size_t known = 0;
     for (size_t i = 0; i < r->count; i++) {
         const npg_recover_frame *f = &r->frames[i];
         const double of[] = {f->tracked.chamfer, f->tracked.point_dist_sq, (double)f->cloud.count};
-        if (is_known(f)) r->sorted[r->known_count++] = of[figure];
+        if (is_known(f)) r->sorted[known++] = of[figure];
     }
-    qsort(r->sorted, r->known_count, sizeof *r->sorted, npg_order_double);
-    return r->known_count ? r->sorted[quarters * r->known_count / 4] : 0;
+    qsort(r->sorted, known, sizeof *r->sorted, npg_order_double);
+    return known;
 }
 
 static void set_levels(recovery *r)
 {
-    r->level = fmax(LEVEL_LEAST, quarters_of(r, CHAMFER, 1));
-    double middle = fmax(r->level, quarters_of(r, CHAMFER, 2));
-    r->apart = r->known_count / 4 < NPG_CONFIRMED
-                   ? HUGE_VAL
-                   : fmax(MORE * r->level, r->level + APART * (middle - r->level));
-    r->point_level = quarters_of(r, POINTS_PART, 1);
-    r->usual_count = quarters_of(r, POINT_COUNT, 2);
+    size_t known = sort(r, CHAMFER);
+    r->level = fmax(LEVEL_LEAST, known ? r->sorted[known / 4] : 0);
+    double middle = fmax(r->level, known ? r->sorted[known / 2] : 0);
+    r->apart =
+        known / 4 < NPG_CONFIRMED ? HUGE_VAL : fmax(MORE * r->level, r->level + APART * (middle - r->level));
+    sort(r, POINTS_PART);
+    r->point_level = known ? r->sorted[known / 4] : 0;
+    sort(r, POINT_COUNT);
+    r->usual_count = known ? r->sorted[known / 2] : 0;
 }
 
 /* ---- frames that look alike ---- */
@@ -227,7 +227,7 @@ static npg_status find_starts(starts *s, const recovery *r, size_t i, int sweep)
     return NPG_OK;
 }
 
-/* Whether a sweep before has tried it: once more it would end where it ended. */
+/* Whether a sweep before has tried it, from where it would end as it did; from now on this one has. */
 static bool was_tried(recovery *r, const npg_recover_frame *frame, const start *from)
 {
     size_t bytes = npg_pose_bytes(npg_tracker_node_count(r->by.tracker)), i = 0;

@@ -169,9 +169,9 @@ static bool is_behind(const npg_reference_loop *loop, const npg_pass_result *res
 {
     const npg_pass_result *kept = &loop->tried[loop->kept];
     int64_t then = loop->now.passes - 2;
-    int64_t least = then < loop->best.passes ? loop->best.bad_after[then < 0 ? 0 : then] : kept->bad_count;
-    return then >= 0 && !loop->is_key_back && result->key != kept->key &&
-           is_more(result, loop->now.bad_least, least);
+    if (then < 0 || loop->is_key_back || result->key == kept->key) return false;
+    return is_more(result, loop->now.bad_least,
+                   then < loop->best.passes ? loop->best.bad_after[then] : kept->bad_count);
 }
 
 /* How the keyframe that is settled on goes on after a pass.  true: a side stands still, with nothing gained, or is behind. */
