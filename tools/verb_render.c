@@ -1,8 +1,11 @@
 /* neupig render: meshes and clouds to a PNG, without a display. */
 #include <stddef.h>
+#include <string.h>
 
 #include "ingest/ingest.h"
+#include "pipeline/file.h"
 #include "tools/cli.h"
+#include "tools/view/view.h"
 
 typedef struct settings {
     const char *output;
@@ -36,7 +39,7 @@ const npg_option npg_render_options[] = {
     NPG_ROW_REAL  ("elevation",  AT(elevation),  "12",    -90,   90,   "DEGREES",
         "Degrees above the horizon"),
     NPG_ROW_CHOICE("up",         AT(up),         "auto",  "y|z|-y|-z|auto",
-        "The upward axis; auto: of a rig.json as its sensors stand, else y"),
+        "The upward axis; auto: of a rig, and what a run made of it, as its sensors stand, else y"),
     NPG_ROW_CHOICE("colour",     AT(colour),     "auto",  "plain|vertex|normal|identity|auto",
         "auto: clouds in their own colours, meshes plain; vertex: colours in the file; normal; "
         "identity: by place in the first file, to see vertices keep their place on the body"),
@@ -65,12 +68,39 @@ static npg_status list_files(npg_listing *files, const settings *s, const npg_cl
     return NPG_OK;
 }
 
-/* As the sensors of a rig stand; else y. */
+/* To the folder that a path lies in. */
+static void go_up(char path[NPG_PATH_SIZE])
+{
+    char *slash = strrchr(path, '/');
+    if (slash)
+        *slash = 0;
+    else
+        snprintf(path, NPG_PATH_SIZE, strcmp(path, ".") ? "." : "..");
+}
+
+/* Of the run whose result the file is (OUT/reference.ply, OUT/meshes/...). */
+static npg_status up_of_run(npg_up *up, const char *file)
+{
+    char folder[NPG_PATH_SIZE], path[NPG_PATH_SIZE];
+    json_t *report = NULL;
+    snprintf(folder, sizeof folder, "%s", file);
+    for (int levels = 0; levels < 2 && !report; levels++) {
+        go_up(folder);
+        NPG_TRY(npg_path_of(path, folder, "report.json"));
+        report = json_load_file(path, 0, NULL);
+    }
+    *up = npg_view_up(report);
+    json_decref(report);
+    return NPG_OK;
+}
+
+/* As the sensors of a rig stand, and so in what a run has made of it; else y. */
 static npg_status find_up(npg_up *up, const settings *s, const npg_listing *files)
 {
     *up = s->up == UP_AUTO ? NPG_UP_Y : (npg_up)s->up;
-    if (s->up != UP_AUTO || !files->count || !npg_rig_is_frame(files->paths[0])) return NPG_OK;
-    return npg_rig_up_of(up, files->paths[0]);
+    if (s->up != UP_AUTO || !files->count) return NPG_OK;
+    if (npg_rig_is_frame(files->paths[0])) return npg_rig_up_of(up, files->paths[0]);
+    return up_of_run(up, files->paths[0]);
 }
 
 static npg_status draw(const npg_listing *files, npg_up up, const settings *s)

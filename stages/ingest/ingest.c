@@ -116,7 +116,8 @@ static void report_rig(npg_worker *worker, npg_rig *rig)
         json_array_append_new(sensors, json_pack("{so sI}", "name", npg_json_text(rig->sensors[i].name),
                                                  "images", (json_int_t)images));
     }
-    json_object_set_new(report, "rig", json_pack("{so}", "sensors", sensors));
+    json_object_set_new(report, "rig",
+                        json_pack("{ss so}", "up", npg_up_words[npg_rig_up(rig)], "sensors", sensors));
     npg_worker_log(worker, NPG_LOG_INFO, -1, "%s: a rig of %zu sensors, %zu frames", rig->path,
                    rig->sensor_count, rig->frame_count);
     if (gaps)

@@ -148,6 +148,7 @@ void npg_rig_close(npg_rig **rig);
 /* Which way its sensors have up, on average, as the nearest of y, z, -y and -z: that of the images; of cameras that
  * are put up lying, whose images have it near x, that across them, y or z. */
 npg_up npg_rig_up(const npg_rig *rig);
+extern const char *const npg_up_words[]; /* "y", "z", "-y", "-z", NULL: by npg_up */
 
 /* Place of a frame number; SIZE_MAX for one that is not there. */
 size_t npg_rig_find(const npg_rig *rig, int64_t number);
@@ -167,9 +168,10 @@ uint64_t npg_rig_frame_hash(const npg_rig *rig, size_t frame);
  * not depend on it.  NPG_BAD_INPUT names the image.  A frame without a usable pixel has 0 points. */
 npg_status npg_rig_read(npg_rig *rig, npg_frame *frame, size_t at, npg_origin *origin);
 
-/* The same as a mesh without faces, of the frame with a number: "PATH#NUMBER", and whether a text is that of a
+/* The same of the frame with a number, "PATH#NUMBER", once more as a mesh without faces, and whether a text is that of a
  * rig that is there.  NPG_BAD_INPUT. */
 bool npg_rig_is_frame(const char *text);
+npg_status npg_rig_read_frame(npg_frame *frame, const char *text, npg_origin *origin);
 npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin);
 
 /* npg_rig_up() of the rig of such a frame. */

@@ -100,8 +100,7 @@ static const char *limit_of(const job *j)
                : NULL;
 }
 
-/* As words of render --up, and what `run --axes` then turns to y up. */
-static const char *const up_words[] = {"y", "z", "-y", "-z"};
+/* What `run --axes` turns to y up. */
 static const char *const up_axes[] = {"xyz", "xz-y", "x-y-z", "x-zy"};
 
 static void print_sensors(FILE *out, const job *j)
@@ -122,7 +121,7 @@ static void print_sensors(FILE *out, const job *j)
     if (limit_of(j)) fprintf(out, "limit     %s\n", limit_of(j));
     if (!rig) return;
     npg_up up = npg_rig_up(rig);
-    fprintf(out, "up        %s, as the sensors stand", up_words[up]);
+    fprintf(out, "up        %s, as the sensors stand", npg_up_words[up]);
     if (up != NPG_UP_Y) fprintf(out, "; run --axes %s gives results with y up", up_axes[up]);
     fputc('\n', out);
 }
@@ -169,7 +168,7 @@ static npg_status set_json(job *j)
     if (j->views) json_object_set_new(all, "sensors", json_of_sensors(j));
     if (limit_of(j)) json_object_set_new(all, "limit", json_string(limit_of(j)));
     if (j->list && j->list->rig)
-        json_object_set_new(all, "up", json_string(up_words[npg_rig_up(j->list->rig)]));
+        json_object_set_new(all, "up", json_string(npg_up_words[npg_rig_up(j->list->rig)]));
     char *text = json_dumps(all, JSON_INDENT(1) | JSON_REAL_PRECISION(10));
     npg_status status = text ? npg_copy_text((char **)&f->json, text) : npg_error(NPG_MEMORY, "no memory");
     free(text);

@@ -69,6 +69,34 @@ json.dump(rig, open(sys.argv[3], "w"))' r/rig/rig.json r/rig/own.json r/rig/lyin
     "$NEUPIG" probe r/rig/lying.json | grep '^up  *y, as the sensors stand$'
 }
 
+@test "what a run has made of such a rig is drawn upright, by any name" {
+    "$NEUPIG" synth -o s --rig --cameras 1 --frames 2 --width 80 --height 60 >/dev/null
+    python3 -c '
+import json, sys
+rig = json.load(open(sys.argv[1]))
+for sensor in rig["sensors"]: del sensor["pose"]
+json.dump(rig, open(sys.argv[2], "w"))' s/rig/rig.json s/rig/own.json
+    draw() { # FILES, from FOLDER: as with --up -y, unless another is named
+        (cd "$1" && "$NEUPIG" render "$2" -o "$PWD/auto.png" --height 50 && "$NEUPIG" render "$2" -o "$PWD/up.png" --height 50 --up "${3:--y}")
+        cmp "$1/auto.png" "$1/up.png"
+        rm "$1/auto.png" "$1/up.png"
+    }
+    "$NEUPIG" run s/rig/own.json -o down --effort quick --faces 1000 -q
+    draw . down/meshes
+    draw down reference.ply
+    draw down meshes/frame_0001.ply
+    draw down/meshes frame_0001.ply
+    # results with axes of their own have y up
+    "$NEUPIG" run s/rig/own.json -o turned --effort quick --faces 1000 --axes x-y-z -q
+    draw . turned/meshes y
+    # the page does, too, and has the points of the images
+    "$NEUPIG" view down
+    grep -q '"up":"-y"' down/view.html
+    run "$NEUPIG" view down
+    echo "$output"
+    [[ "$output" != *"without points"* ]]
+}
+
 @test "colours in the file are shown" {
     printf 'ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n' >c.ply
     printf 'property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n' >>c.ply

@@ -27,6 +27,10 @@ typedef struct npg_view_facts {
     char why[512];
 } npg_view_facts;
 
+/* Which way is up in a run's results (report.json; NULL: y): as option up says, or as the sensors of a rig stand, whose axes
+ * they have. */
+npg_up npg_view_up(const json_t *report);
+
 /* The file appears when it is whole.  Failures as npg_view_result_open(), npg_view_group_block(), NPG_DISK.
  * */
 npg_status npg_view_page_write(npg_view_facts *facts, const npg_view_order *order);

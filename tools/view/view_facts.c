@@ -1,6 +1,7 @@
 /* Facts: what a page knows of a result beside meshes and points, as JSON. */
 #include <string.h>
 
+#include "ingest/ingest.h"
 #include "pipeline/json_file.h"
 #include "pipeline/plan.h"
 #include "tools/view/view.h"
@@ -80,11 +81,25 @@ static json_t *json_of_part(const npg_view_part *part)
     return out;
 }
 
+npg_up npg_view_up(const json_t *report)
+{
+    const json_t *stages = json_object_get(report, "stages"), *export = json_object_get(stages, "export"),
+                 *rig = json_object_get(json_object_get(stages, "ingest"), "rig");
+    const char *up = json_string_value(json_object_get(export, "up")),
+               *axes = json_string_value(json_object_get(export, "axes")),
+               *seen = json_string_value(json_object_get(rig, "up"));
+    if (up && !strcmp(up, "z")) return NPG_UP_Z;
+    for (int i = 0; seen && axes && !strcmp(axes, "xyz") && npg_up_words[i]; i++)
+        if (!strcmp(seen, npg_up_words[i])) return (npg_up)i;
+    return NPG_UP_Y;
+}
+
 json_t *npg_view_result_json(const npg_view_result *result)
 {
     const npg_view_part *first = &result->parts[0];
     const json_t *done = first->done;
-    const char *up = json_string_value(json_object_get(npg_view_run_options(first), "up"));
+    const char *asked = json_string_value(json_object_get(npg_view_run_options(first), "up")),
+               *up = asked && !strcmp(asked, "z") ? asked : npg_up_words[npg_view_up(first->report)];
     double fps = npg_view_number(npg_view_run_options(first), "fps", 30);
     json_t *parts = json_array(), *warnings = json_array();
     for (size_t i = 0; i < result->part_count; i++) {
@@ -93,8 +108,7 @@ json_t *npg_view_result_json(const npg_view_result *result)
     }
     json_t *out = json_pack("{so so sb sf ss so so}", "name", npg_json_text(result->name), "path",
                             npg_json_text(result->path), "done", result->is_done, "fps",
-                            fps > 0 && fps < 1e6 ? fps : 30, "up", up && !strcmp(up, "z") ? "z" : "y",
-                            "parts", parts, "warnings", warnings);
+                            fps > 0 && fps < 1e6 ? fps : 30, "up", up, "parts", parts, "warnings", warnings);
     const json_t *source = result->segments ? result->segments : done;
     if (out && json_is_string(json_object_get(source, "status")))
         json_object_set(out, "status", json_object_get(source, "status"));

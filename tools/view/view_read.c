@@ -37,14 +37,29 @@ npg_status npg_view_read_mesh(npg_view_frames *frames, const npg_view_frame *fra
 
 /* ---- the points ---- */
 
-/* Where the points lie: as the run named them, or by the same name in the input folder, whose path is
- * absolute. */
-static npg_status find_source(char **path, const npg_view_frames *frames, const char *source)
+/* From where they lie: as the run named it, or by the same name in the input folder, whose path is absolute; of a rig
+ * its sensors'. */
+static npg_status read_source(npg_frame *cloud, npg_origin *origin, const npg_view_frames *frames,
+                              const npg_view_frame *frame)
 {
-    const char *input = json_string_value(json_object_get(frames->part->job, "input"));
+    const char *input = json_string_value(json_object_get(frames->part->job, "input")),
+               *source = frame->source;
+    const char *moves =
+        json_string_value(json_object_get(npg_view_run_options(frames->part), "align-sensors"));
+    char text[NPG_PATH_SIZE], *path;
+    if (!source) return npg_error(NPG_BAD_INPUT, "its points came from no file");
+    if (input && npg_rig_is(input)) {
+        if (moves && strcmp(moves, "no"))
+            return npg_error(NPG_BAD_INPUT, "the run has moved the rig's sensors (align-sensors)");
+        snprintf(text, sizeof text, "%s#%lld", input, (long long)frame->number);
+        return npg_rig_read_frame(cloud, text, origin);
+    }
     const char *slash = strrchr(source, '/');
-    if (access(source, R_OK) == 0 || !input) return npg_copy_text(path, source);
-    return npg_join_path(path, input, slash ? slash + 1 : source);
+    NPG_TRY(access(source, R_OK) == 0 || !input ? npg_copy_text(&path, source)
+                                                : npg_join_path(&path, input, slash ? slash + 1 : source));
+    npg_status status = npg_read_cloud(cloud, path, origin);
+    npg_release(&path);
+    return status;
 }
 
 /* The capture's coordinates to those of the meshes; points that are not finite go. */
@@ -85,12 +100,8 @@ npg_status npg_view_read_points(npg_view_frames *frames, const npg_view_frame *f
 {
     npg_frame cloud = {0};
     npg_origin origin = {0};
-    char *path = NULL;
     frames->point_count = frames->dropped_count = 0;
-    npg_status status = frame->source ? find_source(&path, frames, frame->source)
-                                      : npg_error(NPG_BAD_INPUT, "its points came from no file");
-    if (!status) status = npg_read_cloud(&cloud, path, &origin);
-    npg_release(&path);
+    npg_status status = read_source(&cloud, &origin, frames, frame);
     if (!status) status = place_points(frames, &cloud, &origin);
     npg_frame_clear(&cloud);
     frames->with_points += frames->point_count > 0;

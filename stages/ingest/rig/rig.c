@@ -173,6 +173,8 @@ void npg_rig_pose(const npg_rig *rig, double out[12], size_t s, const npg_rig_sh
     npg_pose_combine(out, sensor->correction, pose);
 }
 
+const char *const npg_up_words[] = {"y", "z", "-y", "-z", NULL};
+
 npg_up npg_rig_up(const npg_rig *rig)
 {
     double x = 0, y = 0, z = 0, across_y = 0, across_z = 0, pose[12];

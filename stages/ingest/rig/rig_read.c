@@ -139,16 +139,23 @@ npg_status npg_rig_up_of(npg_up *up, const char *text)
     return NPG_OK;
 }
 
-npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin)
+npg_status npg_rig_read_frame(npg_frame *frame, const char *text, npg_origin *origin)
 {
     int64_t number;
     npg_rig *rig;
-    npg_frame frame = {0};
-    *mesh = NULL;
     NPG_TRY(open_rig_of(&rig, &number, text));
     size_t at = npg_rig_find(rig, number);
     npg_status status = at == SIZE_MAX ? npg_error(NPG_BAD_INPUT, "%s: the rig has no such frame", text)
-                                       : npg_rig_read(rig, &frame, at, origin);
+                                       : npg_rig_read(rig, frame, at, origin);
+    npg_rig_close(&rig);
+    return status;
+}
+
+npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *origin)
+{
+    npg_frame frame = {0};
+    *mesh = NULL;
+    npg_status status = npg_rig_read_frame(&frame, text, origin);
     npg_builder points = {.may_be_points = true, .vert_count = frame.point_count};
     points.pos = frame.pos_local;
     points.normals = frame.normals;
@@ -158,6 +165,5 @@ npg_status npg_rig_read_shape(npg_mesh **mesh, const char *text, npg_origin *ori
     if (!status) status = npg_builder_mesh(mesh, &points, text);
     npg_builder_clear(&points);
     npg_frame_clear(&frame);
-    npg_rig_close(&rig);
     return status;
 }

@@ -92,9 +92,10 @@ export class Stage {
         this.renderer.outputColorSpace = LinearSRGBColorSpace;
         this.renderer.autoClear = false;
         this.camera = new PerspectiveCamera(OPENING, 1, 0.01, 100);
-        this.up = up;
+        this.isZUp = up.endsWith("z");
+        this.sign = up.startsWith("-") ? -1 : 1; // cameras have up in minus y
         this.share = 1; // of the pixels' density, while something moves
-        if (up === "z") this.camera.up.set(0, 0, 1);
+        this.camera.up.set(0, this.isZUp ? 0 : this.sign, this.isZUp ? this.sign : 0);
         this.controls = new OrbitControls(this.camera, canvas);
         this.controls.enableDamping = false;
         this.controls.addEventListener("change", onChange);
@@ -127,11 +128,12 @@ export class Stage {
             if (pane.grid) pane.scene.remove(pane.grid);
             pane.grid = new GridHelper(2 * side, 16, this.line, this.line);
             const middle = bounds.low.map((x, a) => (x + bounds.high[a]) / 2);
-            if (this.up === "z") {
+            const floor = this.sign > 0 ? bounds.low : bounds.high;
+            if (this.isZUp) {
                 pane.grid.rotateX(Math.PI / 2);
-                pane.grid.position.set(middle[0], middle[1], bounds.low[2]);
+                pane.grid.position.set(middle[0], middle[1], floor[2]);
             } else {
-                pane.grid.position.set(middle[0], bounds.low[1], middle[2]);
+                pane.grid.position.set(middle[0], floor[1], middle[2]);
             }
             pane.grid.visible = this.hasGrid ?? true;
             pane.scene.add(pane.grid);
@@ -249,7 +251,8 @@ export class Stage {
     #direction(azimuth, elevation) {
         const [a, e] = [azimuth, Math.min(elevation, 89.9)].map((degrees) => (degrees * Math.PI) / 180);
         const [side, ahead, above] = [Math.sin(a) * Math.cos(e), Math.cos(a) * Math.cos(e), Math.sin(e)];
-        return this.up === "z" ? new Vector3(side, -ahead, above) : new Vector3(side, above, ahead);
+        const [front, top] = [this.sign * ahead, this.sign * above];
+        return this.isZUp ? new Vector3(side, -front, top) : new Vector3(side, top, front);
     }
 
     /** What is at a place of the canvas: {result, vertex, corners, weights}, or null. */
