@@ -92,6 +92,10 @@ json.dump(rig, open(sys.argv[2], "w"))' s/rig/rig.json s/rig/own.json
     # the page does, too, and has the points of the images
     "$NEUPIG" view down
     grep -q '"up":"-y"' down/view.html
+    cp -r down part # as if the run were at work
+    rm part/report.json part/done.json
+    "$NEUPIG" view part
+    grep -q '"up":"-y"' part/view.html
     run "$NEUPIG" view down
     echo "$output"
     [[ "$output" != *"without points"* ]]

@@ -1,4 +1,5 @@
 /* Facts: what a page knows of a result beside meshes and points, as JSON. */
+#include <stdio.h>
 #include <string.h>
 
 #include "ingest/ingest.h"
@@ -94,12 +95,27 @@ npg_up npg_view_up(const json_t *report)
     return NPG_UP_Y;
 }
 
+/* A run at work has no report yet, but a rig that can be asked. */
+static npg_up up_of(const npg_view_part *part)
+{
+    const json_t *options = npg_view_run_options(part);
+    const char *up = json_string_value(json_object_get(options, "up")),
+               *axes = json_string_value(json_object_get(options, "axes")),
+               *input = json_string_value(json_object_get(part->job, "input"));
+    char text[NPG_PATH_SIZE];
+    npg_up seen = NPG_UP_Y;
+    if (up && !strcmp(up, "z")) return NPG_UP_Z;
+    if (part->report) return npg_view_up(part->report);
+    snprintf(text, sizeof text, "%s#0", input ? input : "");
+    if (!axes || strcmp(axes, "xyz") || !npg_rig_is_frame(text) || npg_rig_up_of(&seen, text))
+        return NPG_UP_Y;
+    return seen;
+}
+
 json_t *npg_view_result_json(const npg_view_result *result)
 {
     const npg_view_part *first = &result->parts[0];
     const json_t *done = first->done;
-    const char *asked = json_string_value(json_object_get(npg_view_run_options(first), "up")),
-               *up = asked && !strcmp(asked, "z") ? asked : npg_up_words[npg_view_up(first->report)];
     double fps = npg_view_number(npg_view_run_options(first), "fps", 30);
     json_t *parts = json_array(), *warnings = json_array();
     for (size_t i = 0; i < result->part_count; i++) {
@@ -108,7 +124,8 @@ json_t *npg_view_result_json(const npg_view_result *result)
     }
     json_t *out = json_pack("{so so sb sf ss so so}", "name", npg_json_text(result->name), "path",
                             npg_json_text(result->path), "done", result->is_done, "fps",
-                            fps > 0 && fps < 1e6 ? fps : 30, "up", up, "parts", parts, "warnings", warnings);
+                            fps > 0 && fps < 1e6 ? fps : 30, "up", npg_up_words[up_of(first)], "parts", parts,
+                            "warnings", warnings);
     const json_t *source = result->segments ? result->segments : done;
     if (out && json_is_string(json_object_get(source, "status")))
         json_object_set(out, "status", json_object_get(source, "status"));
