@@ -82,34 +82,33 @@ static json_t *json_of_part(const npg_view_part *part)
     return out;
 }
 
-npg_up npg_view_up(const json_t *report)
+/* As option up says; else as a rig has it, by the report or (`seen`, or NULL) by itself, where results have its axes. */
+static npg_up up_by(const json_t *options, const json_t *report, const char *seen)
 {
-    const json_t *stages = json_object_get(report, "stages"), *export = json_object_get(stages, "export"),
-                 *rig = json_object_get(json_object_get(stages, "ingest"), "rig");
-    const char *up = json_string_value(json_object_get(export, "up")),
-               *axes = json_string_value(json_object_get(export, "axes")),
-               *seen = json_string_value(json_object_get(rig, "up"));
+    const json_t *ingest = json_object_get(json_object_get(report, "stages"), "ingest");
+    const char *up = json_string_value(json_object_get(options, "up")),
+               *axes = json_string_value(json_object_get(options, "axes"));
+    if (report) seen = json_string_value(json_object_get(json_object_get(ingest, "rig"), "up"));
     if (up && !strcmp(up, "z")) return NPG_UP_Z;
     for (int i = 0; seen && axes && !strcmp(axes, "xyz") && npg_up_words[i]; i++)
         if (!strcmp(seen, npg_up_words[i])) return (npg_up)i;
     return NPG_UP_Y;
 }
 
+npg_up npg_view_up(const json_t *report)
+{
+    return up_by(json_object_get(json_object_get(report, "stages"), "export"), report, NULL);
+}
+
 /* A run at work has no report yet, but a rig that can be asked. */
 static npg_up up_of(const npg_view_part *part)
 {
-    const json_t *options = npg_view_run_options(part);
-    const char *up = json_string_value(json_object_get(options, "up")),
-               *axes = json_string_value(json_object_get(options, "axes")),
-               *input = json_string_value(json_object_get(part->job, "input"));
+    const char *input = json_string_value(json_object_get(part->job, "input")), *seen = NULL;
     char text[NPG_PATH_SIZE];
-    npg_up seen = NPG_UP_Y;
-    if (up && !strcmp(up, "z")) return NPG_UP_Z;
-    if (part->report) return npg_view_up(part->report);
+    npg_up up;
     snprintf(text, sizeof text, "%s#0", input ? input : "");
-    if (!axes || strcmp(axes, "xyz") || !npg_rig_is_frame(text) || npg_rig_up_of(&seen, text))
-        return NPG_UP_Y;
-    return seen;
+    if (!part->report && npg_rig_is_frame(text) && !npg_rig_up_of(&up, text)) seen = npg_up_words[up];
+    return up_by(npg_view_run_options(part), part->report, seen);
 }
 
 json_t *npg_view_result_json(const npg_view_result *result)
