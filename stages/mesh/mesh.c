@@ -348,6 +348,20 @@ static npg_status take_back_if_worse(making *m)
     return NPG_OK;
 }
 
+/* Of points that were carried astray no surface may be possible: the one that was followed last stays. */
+static npg_status keep_before(making *m, npg_status status)
+{
+    const npg_facts *facts = npg_worker_facts(m->worker);
+    if (!m->fused || !facts->reference || facts->reference_key != m->key->index || !npg_mesh_is_none(status))
+        return status;
+    npg_mesh_warn(m->worker, true, m->key->number,
+                  "no surface of all frames' points, the one before stays: %s", npg_error_text());
+    json_object_set_new(npg_worker_report(m->worker), "taken_back", json_true());
+    npg_mesh_unref(&m->mesh);
+    m->mesh = npg_mesh_ref(facts->reference);
+    return NPG_OK;
+}
+
 /* Layers of sensors that lie beside each other, and noise, make handles of small cells; those that larger cells
  * leave are the body's own, or of points that lie so. */
 static npg_status try_larger_cells(making *m)
@@ -422,7 +436,8 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     if (!status && takes_back)
         m.mesh = npg_mesh_ref(*best_side(worker));
     else if (!status)
-        status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : make(&m);
+        status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : keep_before(&m, make(&m));
+    if (m.mesh == npg_worker_facts(worker)->reference) is_new = false;
     if (!status) status = measure_reference(&m);
     if (!status && is_new) status = try_larger_cells(&m);
     if (!status && is_new) status = take_back_if_worse(&m);

@@ -68,6 +68,25 @@ better() {
     [ "$(fusing_passes rounds.log)" -eq 2 ]
 }
 
+@test "where no surface can be made of what was gathered, the one before stays, and that is said" {
+    real=$(realpath "$(dirname "$NEUPIG")")
+    mkdir -p hindered
+    cp "$NEUPIG" "$real/neupig-devices" hindered/
+    # The last of the surfaces is that of all frames' points.
+    printf '#!/bin/sh\necho >>"$CALLS"\n[ "$(wc -l <"$CALLS")" = "$FAILS" ] && exec true\nexec "%s/neupig-poisson" "$@"\n' "$real" >hindered/neupig-poisson
+    chmod +x hindered/neupig-poisson
+    CALLS=$PWD/calls FAILS=0 hindered/neupig run noisy/points -o whole "${small[@]}" >/dev/null
+    fails=$(wc -l <calls) status=0
+    rm calls
+    CALLS=$PWD/calls FAILS=$fails hindered/neupig run noisy/points -o kept "${small[@]}" >kept.log 2>&1 || status=$?
+    cat kept.log
+    [ "$status" -eq 7 ]
+    grep -q "frame 5: no surface of all frames' points, the one before stays: .*Poisson: the answer has only 0 bytes" kept.log
+    grep -q '"taken_back": true' kept/report.json
+    ! cmp -s whole/reference.ply kept/reference.ply
+    [ "$(ls kept/meshes | wc -l)" -eq 14 ]
+}
+
 @test "only the reference that is delivered has its faults in the report" {
     run "$NEUPIG" run parts/points -o bare "${small[@]}" --frames 0:6 --bars invented=0 --unseen keep
     echo "$output"
