@@ -40,13 +40,13 @@ static bool is_more(const npg_pass_result *result, int64_t one, int64_t other)
 static void grow(npg_reference_walk *now, int64_t unreached)
 {
     npg_brief *brief = &now->brief;
-    bool has_gained = !now->grown || unreached < now->unreached_before;
+    bool has_gained = !now->grown || unreached < now->unreached_least;
     bool asks_less = !has_gained && brief->explained_least > NPG_MAJORITY + EXPLAINED_STEP / 2;
     if (asks_less) brief->explained_least = fmax(brief->explained_least - EXPLAINED_STEP, NPG_MAJORITY);
     now->in_vain = has_gained || asks_less ? 0 : now->in_vain + 1;
     brief->leaves_open = unreached && now->in_vain < 2 && now->grown < NPG_GROWN_MOST;
     now->grown += unreached > 0;
-    now->unreached_before = unreached;
+    if (has_gained) now->unreached_least = unreached;
     brief->was_open = now->grown > 0;
 }
 
@@ -180,10 +180,10 @@ static bool go_on(npg_reference_loop *loop, const npg_pass_result *result)
     npg_reference_walk *now = &loop->now;
     npg_brief *brief = &now->brief;
     /* What a side has taken from past its border was not followed yet: what other frames see through shows then. */
-    bool is_whole_now = now->unreached_before ? !result->unreached_count : result->is_side && !brief->is_side;
+    bool is_whole_now = brief->leaves_open ? !result->unreached_count : result->is_side && !brief->is_side;
     bool gains = result->is_side && has_gained(loop, result);
     bool stands_still =
-        result->has_images && !gains && !is_more(result, now->unreached_before, result->unreached_count);
+        result->has_images && !gains && !is_more(result, now->unreached_least, result->unreached_count);
     bool is_over = result->is_side && (stands_still || is_behind(loop, result));
     grow(now, result->unreached_count);
     brief->takes_back = false;

@@ -36,12 +36,12 @@ typedef struct npg_pass_result {
 
 /* How far a keyframe has come before a pass. */
 typedef struct npg_reference_walk {
-    npg_brief brief;          /* of the pass */
-    int64_t grown;            /* passes that a side of the body has grown through   */
-    int64_t unreached_before; /* of the pass before ...                             */
-    int64_t in_vain;          /* ... and passes in a row that reached no more since */
-    bool is_limited;          /* the pass is for what the reference explains alone  */
-    int64_t bad_least;        /* the fewest frames that failed in a pass with a side of the keyframe */
+    npg_brief brief;         /* of the pass */
+    int64_t grown;           /* passes that a side of the body has grown through   */
+    int64_t unreached_least; /* the fewest that a pass has left ...                 */
+    int64_t in_vain;         /* ... and passes in a row that reached no more since */
+    bool is_limited;         /* the pass is for what the reference explains alone  */
+    int64_t bad_least;       /* the fewest frames that failed in a pass with a side of the keyframe */
     int64_t passes, bad_after[NPG_GROWN_MOST]; /* and after each of them */
 } npg_reference_walk;
 
