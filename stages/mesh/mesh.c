@@ -430,14 +430,13 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     bool is_given = npg_worker_settings(worker)->reference[0];
     bool takes_back = npg_worker_facts(worker)->brief.takes_back;
     bool trims = fused && fused->empty && npg_worker_facts(worker)->brief.trims_only;
-    bool is_new = !trims && !takes_back;
     double since = npg_clock_s();
     npg_status status = npg_point_set_open(&m.set, worker, key, fused);
     if (!status && takes_back)
         m.mesh = npg_mesh_ref(*best_side(worker));
     else if (!status)
         status = is_given ? read_reference(&m) : trims ? keep_uncontradicted(&m) : keep_before(&m, make(&m));
-    if (m.mesh == npg_worker_facts(worker)->reference) is_new = false;
+    bool is_new = !trims && !takes_back && m.mesh != npg_worker_facts(worker)->reference;
     if (!status) status = measure_reference(&m);
     if (!status && is_new) status = try_larger_cells(&m);
     if (!status && is_new) status = take_back_if_worse(&m);
