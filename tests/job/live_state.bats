@@ -89,11 +89,12 @@ check_killed() {
 }
 
 @test "without alignment it is killed inside a window" {
-    local free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 16000}')
+    local free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 400}')
     rm -rf left killed
     "$NEUPIG" run --follow all -o left "${small[@]}" "${open[@]}" "${free[@]}" >left.log
-    for window in -1 0; do # in the first window, then in the second
-        killed_at inside:$window "$NEUPIG" run --follow all -o killed "${small[@]}" "${open[@]}" "${free[@]}" >killed.log 2>&1
+    # in the first window, behind it, and in the second: the first state inside is due at once in each process
+    for record in inside:-1 state:0 inside:0; do
+        killed_at $record "$NEUPIG" run --follow all -o killed "${small[@]}" "${open[@]}" "${free[@]}" >killed.log 2>&1
     done
     "$NEUPIG" run --follow all -o killed "${small[@]}" "${open[@]}" "${free[@]}"
     grep -q '"resumed_frames": [1-9]' killed/report.json
