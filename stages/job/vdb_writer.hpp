@@ -13,8 +13,8 @@ namespace npg
 {
 
 // The bytes are those of openvdb::io::File::write() with the same grids, which takes them all at once: the
-// two upper nodes of a Vec3 grid alone are 0.6 MB however few values it has, and a set of latent grids is
-// eighty of them.  Names of grids must differ; no tree belongs to two grids.
+// two upper nodes of a float grid alone are 0.3 MB however few values it has, and a set of latent grids is
+// hundreds of them.  Names of grids must differ; no tree belongs to two grids.
 class vdb_writer : private openvdb::io::Archive
 {
   public:

@@ -21,27 +21,17 @@ std::string name_of(const npg_level &level, int at, int channel)
     return text;
 }
 
-void give(float from, float *to)
-{
-    to[0] = from;
-}
-void give(const openvdb::Vec3s &from, float *to)
-{
-    for (int c = 0; c < 3; c++) to[c] = from[c];
-}
-
-template <class Grid>
 bool read_grid(openvdb::io::File &file, const npg_level &level, int at, int channel, float *rows)
 {
-    auto grid = openvdb::gridPtrCast<Grid>(file.readGrid(name_of(level, at, channel)));
+    auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid(name_of(level, at, channel)));
     size_t row = level.first_row;
     if (!grid || grid->activeVoxelCount() != level.row_count) return false;
     auto accessor = grid->getConstAccessor();
     for (int i = 0; i < level.nodes; i++)
         for (int j = 0; j < level.nodes; j++)
             for (int k = 0; k < level.nodes; k++, row++)
-                give(accessor.getValue(openvdb::Coord(i, j, k)),
-                     rows + row * NPG_LATENT_CHANNELS + size_t(channel));
+                rows[row * NPG_LATENT_CHANNELS + size_t(channel)] =
+                    accessor.getValue(openvdb::Coord(i, j, k));
     return true;
 }
 
@@ -55,11 +45,8 @@ bool read_levels(const char *path, const npg_levels *levels, float *rows)
     file.open(false); // all at once: no copy in a temporary folder
     for (int at = 0; at < levels->count; at++) {
         const npg_level &level = levels->level[at];
-        int channel = level.channel_first;
-        for (; channel + 3 <= level.channel_end; channel += 3)
-            is_whole = read_grid<openvdb::Vec3SGrid>(file, level, at, channel, rows) && is_whole;
-        for (; channel < level.channel_end; channel++)
-            is_whole = read_grid<openvdb::FloatGrid>(file, level, at, channel, rows) && is_whole;
+        for (int channel = level.channel_first; channel < level.channel_end; channel++)
+            is_whole = read_grid(file, level, at, channel, rows) && is_whole;
     }
     file.close();
     return is_whole;

@@ -3,7 +3,6 @@
 
 #include <cstdio>
 #include <string>
-#include <type_traits>
 
 extern "C" {
 #include "job/vdb_file.h"
@@ -14,9 +13,6 @@ extern "C" {
 
 namespace
 {
-
-using openvdb::FloatGrid;
-using openvdb::Vec3SGrid;
 
 std::string name_of(const npg_level &level, int at, int channel)
 {
@@ -57,48 +53,30 @@ void describe(openvdb::GridBase &grid, const npg_level &level, int at, int chann
     grid.insertMeta("npg_level", openvdb::Int32Metadata(at));
     grid.insertMeta("npg_nodes", openvdb::Int32Metadata(level.nodes));
     grid.insertMeta("npg_lambda", openvdb::DoubleMetadata(level.lambda));
-    grid.insertMeta("npg_channel_first", openvdb::Int32Metadata(channel));
+    grid.insertMeta("npg_channel", openvdb::Int32Metadata(channel));
     grid.insertMeta("npg_frame_first", openvdb::Int64Metadata(place.frame_first));
     grid.insertMeta("npg_frame_last", openvdb::Int64Metadata(place.frame_last));
 }
 
-template <class Grid>
 void add_grid(npg::vdb_writer &file, const npg_level &level, int at, int channel, const float *rows,
               const npg_vdb_place &place)
 {
-    auto grid = Grid::create();
+    auto grid = openvdb::FloatGrid::create();
     auto accessor = grid->getAccessor();
     const float *from = rows + level.first_row * NPG_LATENT_CHANNELS + size_t(channel);
     for (int i = 0; i < level.nodes; i++)
         for (int j = 0; j < level.nodes; j++)
-            for (int k = 0; k < level.nodes; k++, from += NPG_LATENT_CHANNELS) {
-                openvdb::Coord node(i, j, k);
-                if constexpr (std::is_same_v<Grid, FloatGrid>)
-                    accessor.setValueOn(node, *from);
-                else
-                    accessor.setValueOn(node, openvdb::Vec3s(from));
-            }
+            for (int k = 0; k < level.nodes; k++, from += NPG_LATENT_CHANNELS)
+                accessor.setValueOn(openvdb::Coord(i, j, k), *from);
     describe(*grid, level, at, channel, place);
     file.add(grid);
-}
-
-// Three channels at a time, then those that are left over.
-void add_level(npg::vdb_writer &file, const npg_level &level, int at, const float *rows,
-               const npg_vdb_place &place)
-{
-    int channel = level.channel_first;
-    for (; channel + 3 <= level.channel_end; channel += 3)
-        add_grid<Vec3SGrid>(file, level, at, channel, rows, place);
-    for (; channel < level.channel_end; channel++) add_grid<FloatGrid>(file, level, at, channel, rows, place);
 }
 
 int32_t grid_count(const npg_levels *levels)
 {
     int32_t count = 0;
-    for (int at = 0; at < levels->count; at++) {
-        int channels = levels->level[at].channel_end - levels->level[at].channel_first;
-        count += channels / 3 + channels % 3;
-    }
+    for (int at = 0; at < levels->count; at++)
+        count += levels->level[at].channel_end - levels->level[at].channel_first;
     return count;
 }
 
@@ -116,7 +94,11 @@ npg_status npg_vdb_save_levels(const char *path, const npg_levels *levels, const
         about.insertMeta("npg_world_centre", openvdb::Vec3DMetadata(openvdb::Vec3d(place->world_centre)));
         about.insertMeta("npg_unit_per_world", openvdb::DoubleMetadata(place->unit_per_world));
         npg::vdb_writer file(path, about, grid_count(levels));
-        for (int at = 0; at < levels->count; at++) add_level(file, levels->level[at], at, rows, *place);
+        for (int at = 0; at < levels->count; at++) {
+            const npg_level &level = levels->level[at];
+            for (int channel = level.channel_first; channel < level.channel_end; channel++)
+                add_grid(file, level, at, channel, rows, *place);
+        }
         file.close();
         return NPG_OK;
     });
