@@ -16,6 +16,7 @@ typedef struct cell {
     float place[3];         /* middle, at rest */
     uint16_t empty, filled; /* frames */
     uint8_t says;           /* the frame at work */
+    bool is_of_key;         /* the frame with npg_seen.is_key fills it */
 } cell;
 
 struct npg_carving {
@@ -166,12 +167,13 @@ static npg_status look_part(void *user, size_t part)
     return NPG_OK;
 }
 
-static void count_frame(npg_carving *c)
+static void count_frame(npg_carving *c, bool is_key)
 {
     for (size_t i = 0; i < c->count; i++) {
         cell *one = &c->cells[i];
         one->empty += one->says == EMPTY && one->empty < UINT16_MAX;
         one->filled += one->says == FILLED && one->filled < UINT16_MAX;
+        one->is_of_key = one->is_of_key || (is_key && one->says == FILLED);
     }
 }
 
@@ -190,7 +192,7 @@ npg_status npg_carving_see(npg_carving *c, const npg_skin *skin, const npg_seen 
         if (!status) status = npg_parallel(look_part, &l, l.parts);
         npg_depth_map_close(&map);
     }
-    if (!status) count_frame(c);
+    if (!status) count_frame(c, seen->is_key);
     return status;
 }
 
@@ -211,7 +213,8 @@ size_t npg_carving_find(const npg_carving *c, float *places, int frames_least, d
     size_t count = 0;
     for (size_t i = 0; i < c->count; i++) {
         const cell *one = &c->cells[i];
-        if (one->empty < frames_least || one->empty < share * (one->empty + one->filled)) continue;
+        double least = (one->is_of_key ? 1 - share : share) * (one->empty + one->filled);
+        if (one->empty < frames_least || one->empty < least) continue;
         memcpy(places + 3 * count++, one->place, sizeof one->place);
     }
     return count;

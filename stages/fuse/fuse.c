@@ -148,7 +148,8 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
                      .points = c->points,
                      .point_count = c->count,
                      .bin = EMPTY_BIN * s->spacing,
-                     .margin = EMPTY_MARGIN * s->spacing + NPG_WITHIN * s->noise};
+                     .margin = EMPTY_MARGIN * s->spacing + NPG_WITHIN * s->noise,
+                     .is_key = s->grow_dist > 0 && frame->index == s->key};
     if (!s->empty)
         NPG_TRY(npg_carving_open(&s->empty, facts->reference, EMPTY_SIDE * s->spacing,
                                  NPG_BEYOND * s->spacing, EMPTY_MOST));

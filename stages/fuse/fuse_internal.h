@@ -94,6 +94,7 @@ typedef struct npg_seen {
     size_t point_count;
     double bin, margin;    /* of the depth maps */
     npg_free_space *space; /* what the images say, instead of maps of the points; or NULL */
+    bool is_key;           /* the frame that a growing side is of: its motion alone is certain */
 } npg_seen;
 
 /* One frame; skin is where the surface is in it.  NPG_MEMORY. */
@@ -103,7 +104,8 @@ size_t npg_carving_count(const npg_carving *cells);
 double npg_carving_side(const npg_carving *cells);
 
 /* Middles of the empty ones (room for npg_carving_count() x 3): those that at least `frames_least` frames
- * saw empty, and at least `share` of the frames that say anything of them.  Returns how many. */
+ * saw empty, and at least `share` of the frames that say anything of them; 1 - `share` where the frame with
+ * is_key fills them.  Returns how many. */
 size_t npg_carving_find(const npg_carving *cells, float *places, int frames_least, double share);
 
 /* Bytes at most. */

@@ -156,23 +156,28 @@ static void frames_vote(void **state)
     assert_true(find(&c, 1, 0.6).pit > 0);
     assert_int_equal(find(&c, 2, 0.6).pit, 0);
     for (size_t i = 0; i < POINTS; i++) c.points[3 * i + 2] = 0.45f; /* a lid: the cells below its height */
-    npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.2, NULL};
+    npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.2, NULL, false};
     for (int f = 0; f < 2; f++) assert_int_equal(npg_carving_see(c.cells, c.carry, &seen), NPG_OK);
     assert_int_equal(find(&c, 1, 0.6).pit, 0);
     close_capture(&c);
 }
 
 /* A frame of which an image shows a screen at z, as wide as it sees from (0, 0, -4) along z. */
-static void see_screen(const capture *c, float z)
+static void see_screen_of(const capture *c, float z, bool is_key)
 {
     enum { WIDTH = 80 };
     static float image[WIDTH * WIDTH];
-    npg_seen seen = {.sensor_count = 1};
+    npg_seen seen = {.sensor_count = 1, .is_key = is_key};
     for (int i = 0; i < WIDTH * WIDTH; i++) image[i] = 4 + z;
     npg_skin_pose(c->carry, c->mesh->vert_pos);
     seen.space = image_space(image, WIDTH, image_from_below);
     assert_int_equal(npg_carving_see(c->cells, c->carry, &seen), NPG_OK);
     npg_free_space_close(&seen.space);
+}
+
+static void see_screen(const capture *c, float z)
+{
+    see_screen_of(c, z, false);
 }
 
 static void images_vote(void **state)
@@ -190,6 +195,20 @@ static void images_vote(void **state)
     sums most = find(&c, 1, 0.2);
     assert_true(most.pit < all.pit / 2);   /* one of six, where the screen is */
     assert_true(most.body > all.body / 2); /* what lies before it is empty in all frames */
+    close_capture(&c);
+}
+
+static void nearly_all_must_speak_against_the_keyframe(void **state)
+{
+    static capture c;
+    (void)state;
+    open_capture(&c);
+    see_screen_of(&c, 0.4F, true);
+    for (int i = 0; i < 3; i++) see_screen(&c, 2);
+    size_t three_of_four = find(&c, 1, 0.2).pit;
+    see_screen(&c, 2);
+    size_t four_of_five = find(&c, 1, 0.2).pit;
+    assert_true(four_of_five > 50 && three_of_four < four_of_five / 2);
     close_capture(&c);
 }
 
@@ -228,7 +247,7 @@ static void memory_that_fails_is_reported(void **state)
     assert_int_equal(status, NPG_OK);
     npg_carving_close(&cells);
     assert_int_equal(see(&c, above, 0), NPG_OK);
-    npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.02, NULL};
+    npg_seen seen = {above, 1, c.points, c.count, 0.02, 0.02, NULL, false};
     npg_memory_fail_at(1, false);
     assert_int_equal(npg_carving_see(c.cells, c.carry, &seen), NPG_MEMORY);
     npg_memory_fail_at(0, false);
@@ -242,6 +261,7 @@ int main(void)
         cmocka_unit_test(what_is_hidden_is_not_empty),
         cmocka_unit_test(frames_vote),
         cmocka_unit_test(images_vote),
+        cmocka_unit_test(nearly_all_must_speak_against_the_keyframe),
         cmocka_unit_test(bounds_hold),
         cmocka_unit_test(memory_that_fails_is_reported),
     };
