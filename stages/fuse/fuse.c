@@ -129,19 +129,14 @@ static npg_status add_points(state *s, const cloud *c, int64_t frame, double nea
     return NPG_OK;
 }
 
-/* Of a rig by its images, not by its points: these lack what lies at outlines and at a slant. */
-static bool knows_empty(const npg_frame *frame)
-{
-    return frame->sensor_count && (frame->views || !frame->sensors);
-}
-
-/* What the sensors of the frame say of the space around the surface. */
+/* What the sensors of the frame say of the space around the surface: of a rig by its images, not by its points, which lack
+ * what lies at outlines and at a slant. */
 static npg_status look_around(npg_worker *worker, const cloud *c, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     float at[3 * NPG_FRAME_SENSORS_MOST];
-    if (!knows_empty(frame)) return NPG_OK;
+    if (!frame->sensor_count || (frame->sensors && !frame->views)) return NPG_OK;
     npg_box_local_to_unit(&facts->box, at, frame->sensor_local, frame->sensor_count);
     npg_seen seen = {.sensors = at,
                      .sensor_count = frame->sensor_count,

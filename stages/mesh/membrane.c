@@ -31,24 +31,41 @@ static double relax(npg_mesh *mesh, const npg_mesh_neighbours *r, size_t v)
     return sqrt(moved);
 }
 
-enum { STAYS, UNSEEN, MOVES, PUSHED /* moves, and was in empty space */ };
+enum { STAYS, DOUBTFUL, UNSEEN, MOVES, PUSHED /* moves, and was in empty space */ };
 
-/* Unseen vertices move where their piece of the mesh has seen ones; without any they would fall into a point.
- * `ends` (V) is for the vertices that are reached. */
-static size_t reach(uint8_t *kind, uint32_t *ends, const npg_mesh_neighbours *r, size_t n)
+/* From the vertices that are `from`, over those that are `over`: what is reached becomes `to`.  Returns how many;
+ * `ends` (V) is for their list. */
+static size_t spread(uint8_t *kind, uint32_t *ends, const npg_mesh_neighbours *r, size_t n, uint8_t from,
+                     uint8_t over, uint8_t to)
 {
-    size_t count = 0, moved = 0;
+    size_t count = 0, reached = 0;
     for (size_t v = 0; v < n; v++)
-        if (kind[v] == STAYS) ends[count++] = (uint32_t)v;
+        if (kind[v] == from) ends[count++] = (uint32_t)v;
     for (size_t i = 0; i < count; i++)
         for (uint32_t at = r->start[ends[i]]; at < r->start[ends[i] + 1]; at++) {
             uint32_t v = r->of[at];
-            if (kind[v] != UNSEEN) continue;
-            kind[v] = MOVES;
+            if (kind[v] != over) continue;
+            kind[v] = to;
             ends[count++] = v;
-            moved++;
+            reached++;
         }
-    return moved;
+    return reached;
+}
+
+/* Poisson's balloon begins where points end, and is near them there: with what is farther from all points than
+ * seen_dist goes what hangs on it and is farther than half of that.  Unseen vertices move where their piece of the mesh
+ * has seen ones; without any they would fall into a point. */
+static size_t choose_moving(uint8_t *kind, uint32_t *ends, const npg_mesh_neighbours *r, const float *dist,
+                            size_t n, double seen_dist)
+{
+    for (size_t v = 0; v < n; v++) {
+        double share = (double)dist[v] / seen_dist;
+        kind[v] = share > 1 ? UNSEEN : share > 0.5 ? DOUBTFUL : STAYS;
+    }
+    spread(kind, ends, r, n, UNSEEN, DOUBTFUL, UNSEEN);
+    for (size_t v = 0; v < n; v++)
+        if (kind[v] == DOUBTFUL) kind[v] = STAYS;
+    return spread(kind, ends, r, n, STAYS, UNSEEN, MOVES);
 }
 
 /* What moves, and what keeps it from where it may not be. */
@@ -119,37 +136,23 @@ static npg_status push_out(const moving *m, float *normals)
     return status;
 }
 
-/* kind (V), of the vertices farther from all points than seen_dist: UNSEEN; *unseen: how many. */
-static npg_status find_unseen(uint8_t *kind, size_t *unseen, const npg_mesh *mesh, const float *points,
-                              size_t point_count, double seen_dist)
-{
-    float *dist;
-    NPG_TRY(npg_alloc_array(&dist, NPG_FOR_MESH, mesh->vert_count, sizeof *dist));
-    npg_status status = npg_points_dist(dist, mesh->vert_pos, mesh->vert_count, points, point_count);
-    for (size_t v = 0; v < mesh->vert_count && !status; v++) {
-        kind[v] = (double)dist[v] > seen_dist ? UNSEEN : STAYS;
-        *unseen += kind[v] == UNSEEN;
-    }
-    npg_release(&dist);
-    return status;
-}
-
 npg_status npg_mesh_fair(npg_mesh *mesh, npg_faired *done, const float *points, size_t point_count,
                          double seen_dist, const npg_cube_set *empty)
 {
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
     moving m = {.mesh = mesh, .empty = empty};
-    size_t n = mesh->vert_count, unseen = 0;
+    size_t n = mesh->vert_count;
     *done = (npg_faired){0};
     m.kind = npg_arena_take(&scratch, n, sizeof *m.kind);
     float *normals = npg_arena_take(&scratch, empty ? n : 0, 3 * sizeof *normals);
     m.inward = npg_arena_take(&scratch, empty ? n : 0, sizeof *m.inward);
     m.facing = npg_arena_take(&scratch, empty ? n : 0, sizeof *m.facing);
     uint32_t *ends = npg_arena_take(&scratch, n, sizeof *ends);
+    float *dist = npg_arena_take(&scratch, n, sizeof *dist);
     npg_status status = npg_arena_status(&scratch);
-    if (!status) status = find_unseen(m.kind, &unseen, mesh, points, point_count, seen_dist);
-    if (!status && unseen) status = npg_mesh_neighbours_open(&m.r, mesh);
-    if (!status && unseen) done->moved = reach(m.kind, ends, &m.r, n);
+    if (!status) status = npg_points_dist(dist, mesh->vert_pos, n, points, point_count);
+    if (!status) status = npg_mesh_neighbours_open(&m.r, mesh);
+    if (!status) done->moved = choose_moving(m.kind, ends, &m.r, dist, n, seen_dist);
     if (done->moved) sweep(&m, SWEEPS_MOST, false);
     if (done->moved && empty) status = push_out(&m, normals);
     for (size_t v = 0; v < n && done->moved; v++) done->pushed += m.kind[v] == PUSHED;

@@ -164,8 +164,9 @@ typedef struct npg_faired {
     size_t pushed; /* those of them that were in empty space */
 } npg_faired;
 
-/* Move the vertices of the mesh that are farther than seen_dist from all N points (N x 3), in place; its
- * normals are left as they are.  empty (or NULL): space that sensors saw to be empty.  NPG_MEMORY. */
+/* Move, in place, the vertices of the mesh that are farther than seen_dist from all N points (N x 3), and those
+ * that hang on them and are farther than half of it: the balloon begins where points end.  The mesh's normals are
+ * left as they are.  empty (or NULL): space that sensors saw to be empty.  NPG_MEMORY. */
 npg_status npg_mesh_fair(npg_mesh *mesh, npg_faired *done, const float *points, size_t point_count,
                          double seen_dist, const npg_cube_set *empty);
 

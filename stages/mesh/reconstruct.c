@@ -98,12 +98,13 @@ static npg_status keep_main(reconstruction *r, const char *when)
 
 /* ---- what lies near the points ---- */
 
-/* One frame misses what another sees; all of them have seen what there is to see. */
+/* One frame misses what another sees; all of them have seen what there is to see.  Where sensors are known, what they
+ * saw to be empty says it better: a belly faces as hooves do that were seen, and they saw nothing of it. */
 static npg_status trim_expected(reconstruction *r)
 {
     const npg_point_set *p = r->set;
     double share;
-    if (!p->is_fused || r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
+    if (!p->is_fused || p->empty || r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
     NPG_TRY(npg_mesh_trim_expected(&r->mesh, &share, p->points, p->count, p->seen_dist));
     npg_mesh_note(r->worker, "would_be_seen_share", share);
     if (share > NPG_FEW)
@@ -182,14 +183,9 @@ static npg_status fair(reconstruction *r)
     return done.moved ? npg_mesh_mend(&r->mesh, &mending) : NPG_OK;
 }
 
-/* Out of empty space while the faces are still small: the large ones that decimation leaves over nothing
- * can't follow its border. */
-static npg_status leave_empty_space(reconstruction *r)
+static void note_empty(const reconstruction *r, const char *key)
 {
-    if (!r->set->empty) return NPG_OK;
-    double share = npg_mesh_share_in(r->mesh, r->set->empty);
-    npg_mesh_note(r->worker, "seen_empty_share", share);
-    return share > 0 ? fair(r) : NPG_OK;
+    if (r->set->empty) npg_mesh_note(r->worker, key, npg_mesh_share_in(r->mesh, r->set->empty));
 }
 
 /* ---- few faces, and sound ones ---- */
@@ -240,15 +236,17 @@ static npg_status is_sound(bool *sound, const npg_mesh *mesh)
     return NPG_OK;
 }
 
+/* Drawn tight, and out of empty space, while the faces are still small, too: the large ones that decimation leaves over
+ * nothing can't follow its border. */
 static npg_status shape(reconstruction *r)
 {
     NPG_TRY(trim(r));
-    NPG_TRY(leave_empty_space(r));
+    note_empty(r, "seen_empty_share");
+    NPG_TRY(fair(r));
     NPG_TRY(decimate(r));
     NPG_TRY(turn_faces(r));
     NPG_TRY(fair(r));
-    if (r->set->empty)
-        npg_mesh_note(r->worker, "seen_empty_left_share", npg_mesh_share_in(r->mesh, r->set->empty));
+    note_empty(r, "seen_empty_left_share");
     return NPG_OK;
 }
 

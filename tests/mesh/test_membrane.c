@@ -70,6 +70,41 @@ static void the_balloon_over_a_hole_becomes_flat(void **state)
     npg_mesh_unref(&mesh);
 }
 
+static double from_points(const seen *s, const float *at)
+{
+    double least = INFINITY;
+    for (size_t i = 0; i < s->count; i++) {
+        double way[3];
+        npg_vec3_between(way, at, s->points + 3 * i);
+        least = fmin(least, npg_vec3_length(way));
+    }
+    return least;
+}
+
+/* A balloon that hangs on what is farther than 3 STEP begins at half of that; a bump as high by itself stays. */
+static void the_balloon_begins_where_points_end(void **state)
+{
+    static seen s;
+    npg_mesh *mesh = bulged(&s, 0, 0), *before;
+    npg_faired done;
+    const size_t bump = (SIDE - 4) * SIDE + SIDE - 4;
+    size_t doubtful = 0;
+    (void)state;
+    mesh->vert_pos[3 * bump + 2] += (float)(2 * STEP);
+    assert_int_equal(npg_mesh_copy(&before, mesh), NPG_OK);
+    assert_int_equal(npg_mesh_fair(mesh, &done, s.points, s.count, 3 * STEP, NULL), NPG_OK);
+    for (size_t v = 0; v < mesh->vert_count; v++) {
+        const float *now = mesh->vert_pos + 3 * v, *was = before->vert_pos + 3 * v;
+        double dist = from_points(&s, was);
+        bool moves = v != bump && dist > 1.5 * STEP;
+        doubtful += moves && dist < 3 * STEP;
+        assert_true(moves == (memcmp(now, was, 3 * sizeof(float)) != 0));
+    }
+    assert_true(doubtful > 10);
+    npg_mesh_unref(&before);
+    npg_mesh_unref(&mesh);
+}
+
 static void nothing_moves_where_all_is_seen_or_nothing(void **state)
 {
     static seen s;
@@ -300,6 +335,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_balloon_over_a_hole_becomes_flat),
+        cmocka_unit_test(the_balloon_begins_where_points_end),
         cmocka_unit_test(nothing_moves_where_all_is_seen_or_nothing),
         cmocka_unit_test(a_piece_that_no_point_saw_keeps_its_shape),
         cmocka_unit_test(what_lies_in_empty_space_is_pushed_out_of_it),
