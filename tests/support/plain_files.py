@@ -1,4 +1,4 @@
-"""Plain files that tests read and write: the vertices of a binary PLY, a depth image.
+"""Plain files that tests read and write: the vertices and faces of a binary PLY, a depth image.
 
 From a bats file: PYTHONPATH="$BATS_TEST_DIRNAME/../support" python3 - ...
 """
@@ -8,8 +8,8 @@ import struct
 import zlib
 
 
-def read_vertices(path):
-    """All vertices of a binary PLY, each as {"x": ..., "y": ...}: what its header names."""
+def read_mesh(path):
+    """All vertices of a binary PLY, each as {"x": ..., "y": ...}: what its header names; and its triangles, if it has any."""
     with open(path, "rb") as f:
         head, body = f.read().split(b"end_header\n", 1)
     count = int(re.search(rb"element vertex (\d+)", head).group(1))
@@ -17,7 +17,13 @@ def read_vertices(path):
     row = "<" + "".join({b"float": "f", b"double": "d", b"uchar": "B"}[kind] for kind, _ in fields)
     names = [name.decode() for _, name in fields]
     size = struct.calcsize(row)
-    return [dict(zip(names, struct.unpack_from(row, body, size * v))) for v in range(count)]
+    vertices = [dict(zip(names, struct.unpack_from(row, body, size * v))) for v in range(count)]
+    faces = re.search(rb"element face (\d+)", head)
+    return vertices, [struct.unpack_from("<x3i", body, size * count + 13 * f) for f in range(int(faces.group(1)) if faces else 0)]
+
+
+def read_vertices(path):
+    return read_mesh(path)[0]
 
 
 def write_depth(path, rows):
