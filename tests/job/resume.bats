@@ -5,7 +5,7 @@ load ../support/store
 small=(--method '{"epochs": 10, "poisson-depth": 4, "window": 5, "overlap": 2,
                   "align-nodes": 40, "align-steps": 6}' --faces 400
     --keyframe 6 --bars residual=100,lost=100,coverage=0,flipped=100 --quiet)
-free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3}')
+free=(--method '{"align": false, "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 20}')
 grids=(--method '{"preset": "grids", "width-1": 32, "width-2": 32, "grid-levels": 3, "epochs": 60}')
 
 # What a run that was killed with two states left is in "broken".
