@@ -17,9 +17,9 @@ typedef struct npg_vdb_place {
 } npg_vdb_place;
 
 /* Write all dense levels of rows [row_count][32] to a file: a float grid for each channel of each level,
- * "position_L05_c03" (level 5, channel 3).  The voxel (i, j, k) is node (i, j, k) of the level; the transform takes it to world coordinates
- * (grids over normal directions: to the cube [-1, 1]^3; so do the others where the capture is so small that
- * OpenVDB can't hold their voxels, and then they have the metadata npg_space = "unit").  Every grid has the
+ * "position_L05_c03" (level 5, channel 3).  The voxel (i, j, k) is node (i, j, k) of the level; the transform
+ * takes it to world coordinates (grids over normal directions: to the cube [-1, 1]^3; so do the others where
+ * the capture is so small that OpenVDB can't hold their voxels: npg_space = "unit").  Every grid has the
  * metadata npg_level, npg_nodes, npg_lambda (of I + lambda (2 D - A), kernels/levels.h), npg_channel,
  * npg_frame_first, npg_frame_last; the file has npg_window, npg_levels, npg_world_centre,
  * npg_unit_per_world.  Values are the unknowns of the fit, differential coordinates: the features are that
