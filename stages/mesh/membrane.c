@@ -58,10 +58,8 @@ static size_t spread(uint8_t *kind, uint32_t *ends, const npg_mesh_neighbours *r
 static size_t choose_moving(uint8_t *kind, uint32_t *ends, const npg_mesh_neighbours *r, const float *dist,
                             size_t n, double seen_dist)
 {
-    for (size_t v = 0; v < n; v++) {
-        double share = (double)dist[v] / seen_dist;
-        kind[v] = share > 1 ? UNSEEN : share > 0.5 ? DOUBTFUL : STAYS;
-    }
+    for (size_t v = 0; v < n; v++)
+        kind[v] = (double)dist[v] > seen_dist ? UNSEEN : 2 * (double)dist[v] > seen_dist ? DOUBTFUL : STAYS;
     spread(kind, ends, r, n, UNSEEN, DOUBTFUL, UNSEEN);
     for (size_t v = 0; v < n; v++)
         if (kind[v] == DOUBTFUL) kind[v] = STAYS;
@@ -142,6 +140,7 @@ npg_status npg_mesh_fair(npg_mesh *mesh, npg_faired *done, const float *points, 
     npg_arena scratch = {.purpose = NPG_FOR_MESH};
     moving m = {.mesh = mesh, .empty = empty};
     size_t n = mesh->vert_count;
+    bool any = false;
     *done = (npg_faired){0};
     m.kind = npg_arena_take(&scratch, n, sizeof *m.kind);
     float *normals = npg_arena_take(&scratch, empty ? n : 0, 3 * sizeof *normals);
@@ -151,8 +150,9 @@ npg_status npg_mesh_fair(npg_mesh *mesh, npg_faired *done, const float *points, 
     float *dist = npg_arena_take(&scratch, n, sizeof *dist);
     npg_status status = npg_arena_status(&scratch);
     if (!status) status = npg_points_dist(dist, mesh->vert_pos, n, points, point_count);
-    if (!status) status = npg_mesh_neighbours_open(&m.r, mesh);
-    if (!status) done->moved = choose_moving(m.kind, ends, &m.r, dist, n, seen_dist);
+    for (size_t v = 0; v < n && !status && !any; v++) any = (double)dist[v] > seen_dist;
+    if (any) status = npg_mesh_neighbours_open(&m.r, mesh);
+    if (any && !status) done->moved = choose_moving(m.kind, ends, &m.r, dist, n, seen_dist);
     if (done->moved) sweep(&m, SWEEPS_MOST, false);
     if (done->moved && empty) status = push_out(&m, normals);
     for (size_t v = 0; v < n && done->moved; v++) done->pushed += m.kind[v] == PUSHED;

@@ -51,7 +51,6 @@ shares() { # OUT
 }
 
 @test "a ball that can leave the place is brought out of it" {
-    nodes=1600
     run_it free --reference with_ball.obj --bars flipped=100,invented=100,unsupported=100 # it is turned inside out on the way
     shares free | awk '{ print } $1 > 0.01 { exit 1 }'
 }
