@@ -313,6 +313,9 @@ npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, 
 /* How many those are. */
 npg_status npg_mesh_count_components(size_t *count, const npg_mesh *mesh);
 
+/* The mean of a face's three vertices. */
+void npg_face_middle(float middle[3], const float *vert_pos, const uint32_t face[3]);
+
 /* Area of one face, and signed volume and area of all (positive volume: faces look outward). */
 double npg_face_area(const float *vert_pos, const uint32_t face[3]);
 double npg_mesh_area(const npg_mesh *mesh);

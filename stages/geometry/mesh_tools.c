@@ -144,6 +144,13 @@ npg_status npg_mesh_components(uint32_t *component_of, size_t *component_count, 
     return NPG_OK;
 }
 
+void npg_face_middle(float middle[3], const float *vert_pos, const uint32_t face[3])
+{
+    for (size_t a = 0; a < 3; a++)
+        middle[a] = vert_pos[3 * (size_t)face[0] + a] / 3 + vert_pos[3 * (size_t)face[1] + a] / 3 +
+                    vert_pos[3 * (size_t)face[2] + a] / 3;
+}
+
 double npg_face_area(const float *vert_pos, const uint32_t face[3])
 {
     double n[3];

@@ -260,8 +260,8 @@ double npg_mesh_share_in(const npg_mesh *mesh, const npg_cube_set *cubes)
     for (size_t f = 0; f < mesh->face_count; f++) {
         const uint32_t *face = mesh->faces + 3 * f;
         double area = npg_face_area(mesh->vert_pos, face);
-        float middle[3] = {0, 0, 0};
-        for (size_t i = 0; i < 9; i++) middle[i % 3] += mesh->vert_pos[3 * (size_t)face[i / 3] + i % 3] / 3;
+        float middle[3];
+        npg_face_middle(middle, mesh->vert_pos, face);
         all += area;
         if (npg_cube_set_value(cubes, middle) > WELL_IN) in += area;
     }

@@ -43,8 +43,8 @@ static const npg_option mesh_options[] = {
         "Faces of the reference mesh at most. And no more than 4 per point"),
     NPG_ROW_CHOICE( "unseen",         AT(surface.unseen),   "auto",  "auto|keep|trim|close",
         "What becomes of surface that no frame saw. Holes, the far side of a single view: keep it as "
-        "Poisson closed it, trim it, or draw it tight between what was seen, and trim it where all else that "
-        "faces the same way was seen, or when it is more than a quarter of the area (auto); close: then give the shell that is left a back, drawn tight "
+        "Poisson closed it, trim it, or draw it tight between what was seen, and trim it where whoever saw "
+        "the rest would have seen it, or when it is more than a quarter of the area (auto); close: then give the shell that is left a back, drawn tight "
         "from border to border. It is reported in any case, and no fault where it was asked for (close)"),
     NPG_PART(REAL,  "bars.invented",  AT(invented_max),     "10",    0,  100,  "PERCENT",
         "most of the reference's area that no point saw and that was kept, in per cent; of a given mesh: "
@@ -139,9 +139,8 @@ static npg_status keep_uncontradicted(making *m)
     uint8_t *keep;
     NPG_TRY(npg_alloc(&keep, NPG_FOR_MESH, all->face_count));
     for (size_t f = 0; f < all->face_count; f++) {
-        float middle[3] = {0, 0, 0};
-        for (size_t i = 0; i < 9; i++)
-            middle[i % 3] += all->vert_pos[3 * (size_t)all->faces[3 * f + i / 3] + i % 3] / 3;
+        float middle[3];
+        npg_face_middle(middle, all->vert_pos, all->faces + 3 * f);
         keep[f] = npg_cube_set_value(m->set.empty, middle) <= NPG_MAJORITY;
     }
     npg_status status = npg_mesh_keep_faces(&m->mesh, keep);

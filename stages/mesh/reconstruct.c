@@ -105,13 +105,13 @@ static npg_status trim_expected(reconstruction *r)
     const npg_point_set *p = r->set;
     double share;
     if (!p->is_fused || p->empty || r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
-    NPG_TRY(npg_mesh_trim_expected(&r->mesh, &share, p->points, p->count, p->seen_dist));
+    NPG_TRY(npg_mesh_trim_expected(&r->mesh, &share, p));
     npg_mesh_note(r->worker, "would_be_seen_share", share);
     if (share > NPG_FEW)
         npg_mesh_warn(
             r->worker, false, p->key_number,
-            "%.1f %% of the reconstructed surface has no point near it in any frame, though all else "
-            "that faces the same way has some: no surface, trimmed off",
+            "%.1f %% of the reconstructed surface has no point near it in any frame, though who saw the "
+            "keyframe would have seen it: no surface, trimmed off",
             100 * share);
     return NPG_OK;
 }
