@@ -21,6 +21,7 @@
 #include "geometry/limits.h"
 #include "mesh/surface.h"
 #include "pipeline/order.h"
+#include "track/track.h"
 
 #define SIDE_LEAST   0.25 /* of a cell, in spacings of the keyframe's points */
 #define FRAMES_SHARE 0.05 /* of all frames must have seen a place: wrong motion shows others in a few */
@@ -42,6 +43,7 @@ typedef struct state {
     npg_skin *skin;
     npg_cells *cells;
     npg_carving *empty;        /* NULL: it is not known where sensors stood */
+    npg_viewpoints viewpoints; /* of the keyframe, where nobody says where sensors stood */
     npg_free_space *key_space; /* what the keyframe's images say; NULL: it has none */
     npg_colour_cells *colours; /* NULL: the points have no colours, or none are wanted */
     int64_t key;               /* index of the keyframe */
@@ -136,10 +138,14 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     float at[3 * NPG_FRAME_SENSORS_MOST];
-    if (!frame->sensor_count || (frame->sensors && !frame->views)) return NPG_OK;
-    npg_box_local_to_unit(&facts->box, at, frame->sensor_local, frame->sensor_count);
+    size_t count = frame->sensor_count ? frame->sensor_count : s->viewpoints.count;
+    if (!count || (frame->sensors && !frame->views)) return NPG_OK;
+    if (frame->sensor_count)
+        npg_box_local_to_unit(&facts->box, at, frame->sensor_local, count);
+    else
+        npg_viewpoints_place(at, &s->viewpoints, c->points, c->count);
     npg_seen seen = {.sensors = at,
-                     .sensor_count = frame->sensor_count,
+                     .sensor_count = count,
                      .points = c->points,
                      .point_count = c->count,
                      .bin = EMPTY_BIN * s->spacing,
@@ -160,6 +166,19 @@ static size_t most_cells(const npg_facts *facts)
     return points < NPG_FUSED_MOST ? points : NPG_FUSED_MOST;
 }
 
+/* Where nobody says where sensors stood, nor that none did. */
+static npg_status find_viewpoints(npg_worker *worker, const cloud *key)
+{
+    state *s = npg_worker_state(worker);
+    const npg_facts *facts = npg_worker_facts(worker);
+    const char *sensor = npg_options_get(npg_worker_options(worker), "sensor");
+    if (facts->sensor_count_max || !key->normals || !strcmp(sensor, "none")) return NPG_OK;
+    NPG_TRY(npg_viewpoints_find(&s->viewpoints, facts->reference, key->points, key->normals, key->count,
+                                NPG_SAMPLED * s->spacing));
+    if (s->viewpoints.sees_hidden) s->viewpoints.count = 0;
+    return NPG_OK;
+}
+
 static npg_status open_gathering(npg_worker *worker, const cloud *key, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
@@ -171,6 +190,7 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key, const npg
     double side = fmax(SIDE_LEAST, 1 / sqrt((double)facts->planned_count)); /* for a point of all frames */
     NPG_TRY(npg_cells_open(&s->cells, side * s->spacing, most_cells(facts)));
     NPG_TRY(npg_skin_open(&s->skin, facts->reference));
+    NPG_TRY(find_viewpoints(worker, key));
     if (facts->sensor_count_max && npg_skin_is_open(s->skin))
         s->grow_dist =
             NPG_NEARBY_SHARE * npg_points_diagonal(facts->reference->vert_pos, facts->reference->vert_count);
@@ -239,6 +259,7 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
     fused->spacing_unit = npg_cells_side(s->cells);
     fused->key_spacing_unit = s->spacing;
     fused->key_noise_unit = s->noise;
+    fused->sees_hidden = s->viewpoints.sees_hidden;
     NPG_TRY(npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least));
     return s->grow_dist > 0 ? drop_scattered(fused, fmax(DENSE_SPACINGS * s->spacing,
                                                          NPG_VOTE_CELLS * fused->spacing_unit))
@@ -263,8 +284,10 @@ static npg_status collect_empty(const state *s, npg_fused *fused)
     if (!most) return NPG_OK;
     NPG_TRY(npg_alloc_array(&fused->empty, NPG_FOR_MESH, most, 3 * sizeof(float)));
     fused->empty_side = npg_carving_side(s->empty);
-    fused->empty_count = npg_carving_find(s->empty, fused->empty,
-                                          s->frames < 2 * NPG_CONFIRMED ? 1 : NPG_CONFIRMED, 1 - NPG_MOST);
+    /* by viewpoints that were found, not known, more must say so */
+    fused->empty_count =
+        npg_carving_find(s->empty, fused->empty, s->frames < 2 * NPG_CONFIRMED ? 1 : NPG_CONFIRMED,
+                         s->viewpoints.count ? NPG_MAJORITY : 1 - NPG_MOST);
     return NPG_OK;
 }
 
@@ -339,9 +362,8 @@ static size_t memory(const npg_worker *worker, size_t *chunks_held)
     *chunks_held = 1;
     size_t colours =
         npg_worker_settings(worker)->colour == NPG_COLOUR_NO ? 0 : npg_colour_cells_memory(COLOURS_MOST);
-    size_t empty = facts->sensor_count_max ? npg_carving_memory(EMPTY_MOST) : 0;
-    return empty + colours + npg_cells_memory(most_cells(facts)) + points * 8 * sizeof(float) +
-           npg_skin_memory(npg_worker_verts_at_most(worker), points) +
+    return npg_carving_memory(EMPTY_MOST) + colours + npg_cells_memory(most_cells(facts)) +
+           points * 8 * sizeof(float) + npg_skin_memory(npg_worker_verts_at_most(worker), points) +
            2 * npg_free_space_memory(facts->view_count_max);
 }
 

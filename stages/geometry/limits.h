@@ -39,6 +39,9 @@
 #define NPG_NEARBY_SHARE 0.1
 #define NPG_REMOTE_SHARE 0.15
 
+/* Diagonals of a cloud, from its middle: where a sensor is taken to stand, if nobody knows. */
+#define NPG_SENSOR_AWAY 1.5
+
 /* Points around one that say how dense and noisy a cloud is there, and those that are a piece of surface. */
 #define NPG_AROUND 8
 #define NPG_PATCH  16

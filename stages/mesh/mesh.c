@@ -43,8 +43,8 @@ static const npg_option mesh_options[] = {
         "Faces of the reference mesh at most. And no more than 4 per point"),
     NPG_ROW_CHOICE( "unseen",         AT(surface.unseen),   "auto",  "auto|keep|trim|close",
         "What becomes of surface that no frame saw. Holes, the far side of a single view: keep it as "
-        "Poisson closed it, trim it, or draw it tight between what was seen, and trim it where whoever saw "
-        "the rest would have seen it, or when it is more than a quarter of the area (auto); close: then give the shell that is left a back, drawn tight "
+        "Poisson closed it, trim it, or draw it tight between what was seen, and trim it where points are "
+        "all over, hidden ones too, or when it is more than a quarter of the area (auto); close: then give the shell that is left a back, drawn tight "
         "from border to border. It is reported in any case, and no fault where it was asked for (close)"),
     NPG_PART(REAL,  "bars.invented",  AT(invented_max),     "10",    0,  100,  "PERCENT",
         "most of the reference's area that no point saw and that was kept, in per cent; of a given mesh: "

@@ -26,24 +26,22 @@ void npg_mesh_warn(npg_worker *worker, bool partial, int64_t frame, const char *
  * are.  Unit coordinates throughout. */
 
 typedef struct npg_point_set {
-    float *points;            /* N x 3, owned                                               */
-    float *normals;           /* N x 3, outward, owned; NULL: the keyframe has none         */
-    size_t count;             /* N                                                          */
-    bool has_given_normals;   /* the capture's own; false: estimated from the points       */
-    size_t given;             /* points there were, before any was left out                 */
-    bool is_fused;            /* of all frames; false: of the keyframe alone                */
-    int64_t key_number;       /* the keyframe's, for the log                                */
-    double spacing;           /* npg_cloud_spacing()                                        */
-    double diagonal;          /* of the points' box                                         */
-    double seen_dist;         /* a place was seen when a point is nearer than this          */
-    float *key_points;        /* K x 3, where is_fused, the keyframe's own, owned; else NULL */
-    const float *key_normals; /* K x 3, of the frame, a loan                              */
-    size_t key_count;         /* K                                                          */
-    double key_spacing;       /* where is_fused, of the keyframe's points; else 0           */
-    double key_noise;         /* of the same, across the surface                            */
-    bool is_smooth;           /* smoothed as far as their noise asks for it ...             */
-    bool is_rough;            /* ... as a frame's are noisy beyond doubt                    */
-    npg_cube_set *empty;      /* space that sensors saw to be empty, owned; NULL: not known */
+    float *points;          /* N x 3, owned                                               */
+    float *normals;         /* N x 3, outward, owned; NULL: the keyframe has none         */
+    size_t count;           /* N                                                          */
+    bool has_given_normals; /* the capture's own; false: estimated from the points       */
+    size_t given;           /* points there were, before any was left out                 */
+    bool is_fused;          /* of all frames; false: of the keyframe alone                */
+    bool sees_hidden;       /* npg_viewpoints: what has no point is no surface */
+    int64_t key_number;     /* the keyframe's, for the log                                */
+    double spacing;         /* npg_cloud_spacing()                                        */
+    double diagonal;        /* of the points' box                                         */
+    double seen_dist;       /* a place was seen when a point is nearer than this          */
+    double key_spacing;     /* where is_fused, of the keyframe's points; else 0           */
+    double key_noise;       /* of the same, across the surface                            */
+    bool is_smooth;         /* smoothed as far as their noise asks for it ...             */
+    bool is_rough;          /* ... as a frame's are noisy beyond doubt                    */
+    npg_cube_set *empty;    /* space that sensors saw to be empty, owned; NULL: not known */
 } npg_point_set;
 
 /* The keyframe's points, an even choice of them where there are many; with `fused` (or NULL) those of all
@@ -208,11 +206,6 @@ npg_status npg_mesh_denoise(npg_mesh *mesh, const float *points, const float *no
 npg_status npg_mesh_keep_share(npg_mesh **mesh, double *share, const uint8_t *keep_face);
 
 /* Unseen: which vertices of the finished reference no point supports that it was made from. */
-
-/* Expected: drop the patches of surface without points, by the mean of a face's vertices, that those would have seen
- * who saw the keyframe, if they were there (expected.c has the rule).  set: of all frames.  *share: of the area, what
- * went.  NPG_MEMORY. */
-npg_status npg_mesh_trim_expected(npg_mesh **mesh, double *share, const npg_point_set *set);
 
 /* Set mesh->vert_unseen: the vertices that are farther than dist_max from all N points (N x 3).  NPG_MEMORY. */
 npg_status npg_mesh_mark_unseen(npg_mesh *mesh, const float *points, size_t point_count, double dist_max);

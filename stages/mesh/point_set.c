@@ -38,7 +38,7 @@ static npg_status take_frame(npg_point_set *set, npg_worker *worker, const npg_f
 }
 
 /* Those of all frames are thinned already.  The set owns them from here on; `fused` keeps its figures. */
-static npg_status take_fused(npg_point_set *set, npg_worker *worker, const npg_frame *key, npg_fused *fused)
+static npg_status take_fused(npg_point_set *set, npg_worker *worker, npg_fused *fused)
 {
     set->is_fused = true;
     set->given = set->count = fused->count;
@@ -47,10 +47,7 @@ static npg_status take_fused(npg_point_set *set, npg_worker *worker, const npg_f
     set->key_spacing = fused->key_spacing_unit;
     set->key_noise = fused->key_noise_unit;
     fused->points = fused->normals = NULL;
-    set->key_count = key->point_count;
-    set->key_normals = key->normals;
-    NPG_TRY(npg_alloc_array(&set->key_points, NPG_FOR_MESH, set->key_count, 3 * sizeof(float)));
-    npg_box_local_to_unit(&npg_worker_facts(worker)->box, set->key_points, key->pos_local, set->key_count);
+    set->sees_hidden = fused->sees_hidden;
     if (!fused->empty) return NPG_OK;
     NPG_TRY(npg_cube_set_open(&set->empty, fused->empty, fused->empty_count, fused->empty_side));
     if (!npg_worker_facts(worker)->brief.is_side) return NPG_OK;
@@ -73,7 +70,7 @@ npg_status npg_point_set_open(npg_point_set *set, npg_worker *worker, const npg_
 {
     *set = (npg_point_set){.key_number = key->number,
                            .has_given_normals = key->cleaning.normals_given > key->point_count / 2};
-    npg_status status = fused ? take_fused(set, worker, key, fused) : take_frame(set, worker, key);
+    npg_status status = fused ? take_fused(set, worker, fused) : take_frame(set, worker, key);
     if (!status) status = measure(set, worker);
     if (status) npg_point_set_close(set);
     return status;
@@ -83,7 +80,6 @@ void npg_point_set_close(npg_point_set *set)
 {
     npg_release(&set->points);
     npg_release(&set->normals);
-    npg_release(&set->key_points);
     npg_cube_set_close(&set->empty);
 }
 

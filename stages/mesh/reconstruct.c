@@ -98,20 +98,19 @@ static npg_status keep_main(reconstruction *r, const char *when)
 
 /* ---- what lies near the points ---- */
 
-/* One frame misses what another sees; all of them have seen what there is to see.  Where sensors are known, what they
- * saw to be empty says it better: a belly faces as hooves do that were seen, and they saw nothing of it. */
+/* One frame misses what another sees; all of them have seen what there is to see, where they see what is hidden. */
 static npg_status trim_expected(reconstruction *r)
 {
     const npg_point_set *p = r->set;
     double share;
-    if (!p->is_fused || p->empty || r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
-    NPG_TRY(npg_mesh_trim_expected(&r->mesh, &share, p));
+    if (!p->sees_hidden || r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
+    NPG_TRY(npg_mesh_trim(&r->mesh, &share, p->points, p->count, p->seen_dist));
     npg_mesh_note(r->worker, "would_be_seen_share", share);
     if (share > NPG_FEW)
         npg_mesh_warn(
             r->worker, false, p->key_number,
-            "%.1f %% of the reconstructed surface has no point near it in any frame, though who saw the "
-            "keyframe would have seen it: no surface, trimmed off",
+            "%.1f %% of the reconstructed surface has no point near it in any frame, though points are "
+            "seen that no sensor could see: no surface, trimmed off",
             100 * share);
     return NPG_OK;
 }

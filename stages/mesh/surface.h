@@ -27,6 +27,7 @@ typedef struct npg_fused {
      * sensor's place is known. */
     float *empty; /* K x 3, owned, or NULL */
     size_t empty_count;
+    bool sees_hidden; /* npg_viewpoints of the keyframe */
     double empty_side;
 } npg_fused;
 

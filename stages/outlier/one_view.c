@@ -12,7 +12,6 @@
 #define VIEW_CELLS_MAX 512 /* per side of the picture */
 /* Of hidden points, by trial: one view has 0.05 at most, clouds of several 0.08 and more. */
 #define HIDDEN_MAX 0.06
-#define DISTANCE   1.5  /* of a sensor that is looked for, in sizes of the cloud */
 #define POINTS     5000 /* that are drawn, ... */
 #define PLACES     400  /* ... from so many places */
 
@@ -109,7 +108,7 @@ typedef struct search {
 
 static void place_of(double sensor[3], const search *s, const double direction[3])
 {
-    double away = DISTANCE * npg_bounds_diagonal(&s->bounds);
+    double away = NPG_SENSOR_AWAY * npg_bounds_diagonal(&s->bounds);
     for (int a = 0; a < 3; a++) sensor[a] = (s->bounds.lo[a] + s->bounds.hi[a]) / 2 + away * direction[a];
 }
 

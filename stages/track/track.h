@@ -130,6 +130,36 @@ npg_status npg_visible_find(npg_visible *visible, uint8_t *is_seen, const npg_su
                             const float *sensors, size_t sensor_count, const float *places,
                             const uint32_t *verts, const float *vert_normals, size_t count, double offset);
 
+/* Viewpoints: from where a cloud was seen, if nobody says so.
+ *
+ * Of directions d_k all around, C is a choice from which the points can be seen past the surface: again and again
+ * the one that sees the most of those which no other does,
+ *
+ *     k = argmax_k |{i : i not seen from C, i seen from d_k}|,
+ *
+ * while these are more than NPG_FEW of them.  Not the sensors' own places, but what looks where they do: what is seen
+ * from C and has no points is not there.  Not in the paper. */
+
+#define NPG_VIEWPOINTS_MOST 64
+
+typedef struct npg_viewpoints {
+    size_t count;
+    double
+        directions[3 * NPG_VIEWPOINTS_MOST]; /* unit vectors, from the cloud's middle                      */
+    bool
+        sees_hidden; /* more than NPG_FEW of the points are seen from nowhere: no sensor's, and all over the surface */
+} npg_viewpoints;
+
+/* mesh: a surface through the points (N x 3, N >= 1, with outward unit normals), in the same pose and coordinates;
+ * offset: what is nearer than that hides nothing.  Up to 4000 points are asked.  Equal input gives equal bits.
+ * NPG_MEMORY. */
+npg_status npg_viewpoints_find(npg_viewpoints *found, const npg_mesh *mesh, const float *points,
+                               const float *normals, size_t count, double offset);
+
+/* sensors (count x 3 of the viewpoints): places NPG_SENSOR_AWAY from the middle of the points (N x 3). */
+void npg_viewpoints_place(float *sensors, const npg_viewpoints *viewpoints, const float *points,
+                          size_t count);
+
 /* Occlusion prior: how the parts of the body that no sensor sees in a frame are arranged.
  *
  * What is seen has points; all else has only the edges of the graph, and those draw it to the keyframe's
