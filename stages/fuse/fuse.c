@@ -23,6 +23,8 @@
 #include "pipeline/order.h"
 #include "track/track.h"
 
+_Static_assert(NPG_VIEWPOINTS_MOST <= NPG_FRAME_SENSORS_MOST, "both are sensors of a frame");
+
 #define SIDE_LEAST   0.25 /* of a cell, in spacings of the keyframe's points */
 #define FRAMES_SHARE 0.05 /* of all frames must have seen a place: wrong motion shows others in a few */
 
@@ -42,7 +44,7 @@
 typedef struct state {
     npg_skin *skin;
     npg_cells *cells;
-    npg_carving *empty;        /* NULL: it is not known where sensors stood */
+    npg_carving *empty;        /* NULL: nothing was looked at from a known place */
     npg_viewpoints viewpoints; /* of the keyframe, where nobody says where sensors stood */
     npg_free_space *key_space; /* what the keyframe's images say; NULL: it has none */
     npg_colour_cells *colours; /* NULL: the points have no colours, or none are wanted */
@@ -173,10 +175,8 @@ static npg_status find_viewpoints(npg_worker *worker, const cloud *key)
     const npg_facts *facts = npg_worker_facts(worker);
     const char *sensor = npg_options_get(npg_worker_options(worker), "sensor");
     if (facts->sensor_count_max || !key->normals || !strcmp(sensor, "none")) return NPG_OK;
-    NPG_TRY(npg_viewpoints_find(&s->viewpoints, facts->reference, key->points, key->normals, key->count,
-                                NPG_SAMPLED * s->spacing));
-    if (s->viewpoints.sees_hidden) s->viewpoints.count = 0;
-    return NPG_OK;
+    return npg_viewpoints_find(&s->viewpoints, facts->reference, key->points, key->normals, key->count,
+                               NPG_SAMPLED * s->spacing);
 }
 
 static npg_status open_gathering(npg_worker *worker, const cloud *key, const npg_frame *frame)

@@ -54,7 +54,7 @@ static void choose(search *s)
     size_t hidden = 0;
     for (size_t i = 0; i < s->count; i++) hidden += !s->views[i];
     s->found->sees_hidden = (double)hidden > few;
-    for (;;) {
+    while (!s->found->sees_hidden) {
         size_t best = 0, most = 0;
         for (size_t k = 0; k < s->all.count; k++) {
             size_t gained = gain(s, chosen, k);
