@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "geometry/geometry.h"
+#include "geometry/limits.h"
 #include "mesh/surface.h"
 #include "pipeline/clock.h"
 #include "pipeline/parallel.h"
@@ -72,6 +73,9 @@ static npg_status try_one(const choosing *c, npg_candidate *one)
     NPG_TRY(npg_mesh_draft(&draft, cloud->fit, cloud->fit_normals, cloud->fit_count, c->judging.spacing_unit,
                            cloud->sensor_count > 0, c->settings));
     npg_status status = npg_mesh_handles(&one->handles, draft);
+    if (!status)
+        status = npg_mesh_unseen(&one->unseen_share, draft, cloud->fit, cloud->fit_count,
+                                 NPG_SAMPLED * c->judging.spacing_unit);
     if (!status) status = npg_mesh_count_components(&one->pieces, draft);
     if (!status) status = npg_judge(&one->judgement, c->clouds, one->at, draft, &c->judging);
     one->is_followed = !status;
@@ -128,6 +132,8 @@ static int64_t flaws(const npg_candidate *one)
 size_t npg_candidates_best(const npg_candidate *list, size_t count, size_t scored, bool is_side)
 {
     size_t least = least_but(list, count, count), first = scored < count ? scored : 0;
+    if (least < count && !is_side && list[first].is_followed && list[first].unseen_share > NPG_FEW)
+        return first;
     if (least == count || !gives_way(&list[first], &list[least], is_side)) least = first;
     size_t best = least;
     for (size_t i = 0; i < count && list[least].is_followed && !is_side; i++) {
@@ -178,11 +184,11 @@ static void report_candidates(npg_worker *worker, const npg_candidate *list, siz
     json_t *of = json_array();
     for (size_t i = 0; i < count; i++)
         json_array_append_new(
-            of, json_pack("{sI sb so sI sI sI}", "number", (json_int_t)list[i].number, "followed",
+            of, json_pack("{sI sb so sI sI sI sf}", "number", (json_int_t)list[i].number, "followed",
                           list[i].is_followed, "judged",
                           npg_json_real(list[i].is_followed ? list[i].judgement.mean : (double)NAN), "frames",
                           (json_int_t)list[i].judgement.count, "handles", (json_int_t)list[i].handles,
-                          "pieces", (json_int_t)list[i].pieces));
+                          "pieces", (json_int_t)list[i].pieces, "unseen_share", list[i].unseen_share));
     json_object_set_new(npg_worker_report(worker), "candidates", of);
     json_object_set_new(npg_worker_report(worker), "choosing_s", json_real(seconds));
 }

@@ -28,18 +28,9 @@ struct npg_extent {
 static npg_status find_spacing(double *spacing, const npg_frame *frame)
 {
     float *points;
-    size_t count = 0;
     *spacing = 0;
-    NPG_TRY(npg_alloc_array(&points, NPG_FOR_RUN, frame->point_count, 3 * sizeof *points));
-    for (size_t i = 0; i < frame->point_count; i++) {
-        if (!npg_vec3_is_finitef(frame->pos_local + 3 * i)) continue;
-        for (size_t a = 0; a < 3; a++) points[3 * count + a] = frame->pos_local[3 * i + a];
-        count++;
-    }
-    if (count > ASKED_MOST) {
-        npg_points_spread(points, NULL, ASKED_MOST, points, NULL, count);
-        count = ASKED_MOST;
-    }
+    NPG_TRY(npg_alloc_array(&points, NPG_FOR_RUN, ASKED_MOST, 3 * sizeof *points));
+    size_t count = npg_spread_finite(points, ASKED_MOST, frame->pos_local, frame->point_count);
     npg_status status = count > 1 ? npg_cloud_spacing(spacing, points, count) : NPG_OK;
     npg_release(&points);
     return status;

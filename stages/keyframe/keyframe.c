@@ -208,47 +208,34 @@ static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_fram
     return NPG_OK;
 }
 
-/* The paper's: many cells, near the middle in time. */
-static double score_of(size_t cell_count, double from_middle)
-{
-    return (double)cell_count * exp(-0.001 * from_middle * from_middle);
-}
-
-/* Whether the keyframe is the one that shows most surface: before several sensors bodies hide parts of
- * themselves, the more the narrower they stand, and the draft of one frame says little of what all show. */
+/* Whether the keyframe is the one that shows most surface: before several sensors, known or not, bodies hide parts of
+ * themselves, the more the narrower they stand.  One sensor shows most of what it sees best. */
 static bool goes_by_area(const npg_worker *worker)
 {
-    return has_candidates(worker) && npg_worker_facts(worker)->sensor_count_max > 1;
+    return has_candidates(worker) && npg_worker_facts(worker)->sensor_count_max != 1;
 }
 
 /* Whether surfaces of several frames may be compared for the keyframe. */
 static bool compares(const npg_worker *worker)
 {
-    return has_candidates(worker) && !goes_by_area(worker);
+    return has_candidates(worker) && npg_worker_facts(worker)->sensor_count_max < 2;
 }
 
-/* Areas differ by a few per cent only, so the middle weighs less. */
-static double area_score_of(size_t cell_count, double from_middle, int64_t frame_count)
-{
-    double share = from_middle / (double)frame_count;
-    double beyond = fmax(0, fabs(from_middle) - MIDDLE_REACH);
-    return (double)cell_count / (1 + share * share) * exp(-0.001 * beyond * beyond);
-}
-
+/* The paper's score: many cells, near the middle in time.  Areas differ by a few per cent only, so there the middle weighs
+ * less. */
 static npg_status measure_extent(npg_worker *worker, candidate *scored, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    double from_middle = (double)frame->index - (double)facts->planned_count / 2;
+    bool by_area = goes_by_area(worker);
+    double away = (double)frame->index - (double)facts->planned_count / 2;
+    double share = by_area ? away / (double)facts->planned_count : 0;
+    if (by_area) away = fmax(0, fabs(away) - MIDDLE_REACH);
     if (!state->extent) NPG_TRY(npg_extent_open(&state->extent, &facts->box, frame));
     *scored = (candidate){.index = frame->index, .number = frame->number};
-    if (goes_by_area(worker)) {
-        scored->cell_count = npg_extent_area(state->extent, frame);
-        scored->score = area_score_of(scored->cell_count, from_middle, facts->planned_count);
-    } else {
-        scored->cell_count = npg_extent_papers(state->extent, frame);
-        scored->score = score_of(scored->cell_count, from_middle);
-    }
+    scored->cell_count =
+        by_area ? npg_extent_area(state->extent, frame) : npg_extent_papers(state->extent, frame);
+    scored->score = (double)scored->cell_count * exp(-0.001 * away * away) / (1 + share * share);
     return NPG_OK;
 }
 
@@ -379,6 +366,15 @@ static npg_status set_plan(npg_worker *worker)
 
 /* ---- choosing pass: the last word on the keyframe ---- */
 
+/* The windows lie around it. */
+static void take_key(npg_worker *worker, int64_t index, int64_t number)
+{
+    json_t *key = json_pack("{sI sI}", "index", (json_int_t)index, "number", (json_int_t)number);
+    npg_own(worker, plan)->key = index;
+    json_object_set_new(npg_worker_report(worker), "key", key);
+    report_windows(worker);
+}
+
 static npg_status close_choosing(npg_worker *worker)
 {
     keyframe_state *state = npg_worker_state(worker);
@@ -388,11 +384,8 @@ static npg_status close_choosing(npg_worker *worker)
     NPG_TRY(npg_choose_pass_end(&state->choosing, worker, &chosen));
     if (chosen.index < 0 || chosen.index == facts->plan.key) return NPG_OK;
     json_object_set(report, "key_by_score", by_score);
-    npg_own(worker, plan)->key = chosen.index;
-    json_object_set_new(report, "key",
-                        json_pack("{sI sI sf}", "index", (json_int_t)chosen.index, "number",
-                                  (json_int_t)chosen.number, "judged", chosen.judgement.mean));
-    report_windows(worker); /* they lie around the keyframe */
+    take_key(worker, chosen.index, chosen.number);
+    json_object_set_new(json_object_get(report, "key"), "judged", json_real(chosen.judgement.mean));
     return NPG_OK;
 }
 
@@ -410,10 +403,7 @@ static npg_status settle(npg_worker *worker)
     if (npg_worker_pass(worker) != NPG_PASS_FUSE && !facts->brief.is_attempt) return NPG_OK;
     if (key < 0 || key == facts->plan.key) return NPG_OK;
     int64_t number = clouds->list[npg_candidate_clouds_find(clouds, key)].number;
-    npg_own(worker, plan)->key = key;
-    json_object_set_new(npg_worker_report(worker), "key",
-                        json_pack("{sI sI}", "index", (json_int_t)key, "number", (json_int_t)number));
-    report_windows(worker);
+    take_key(worker, key, number);
     npg_worker_log(worker, NPG_LOG_INFO, number, "is the keyframe now");
     return NPG_OK;
 }
@@ -542,7 +532,7 @@ static const npg_option options[] = {
         "--reference, the frame that it is nearest to"),
     NPG_KEY(CHOICE, "keyframe-choice", AT(choice),     "judged", "paper|judged",
         "Take the frame with the paper's score (paper), "
-        "or the one of several whose surface fares best in the others (judged)"),
+        "or the one that shows most surface, if of several its own does not fare worse in the others (judged)"),
     NPG_KEY(INT,    "window",          AT(window),     "24",    -1, 1e6,  NULL,
         "Frames that are solved together; 0: all of them in one window; "
         "-1: so up to 60 frames, and windows of 24 where there are more"),

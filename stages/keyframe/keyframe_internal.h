@@ -31,6 +31,9 @@ void npg_likeness_close(npg_likeness **likeness);
 npg_status npg_likeness_dist(double *dist_unit, const npg_likeness *likeness, const npg_frame *frame,
                              const npg_frame_box *box);
 
+/* The finite ones of at most `most` points (count x 3), spread over their order; out has room for as many. */
+size_t npg_spread_finite(float *out, size_t most, const float *points, size_t count);
+
 /* Extent: how much surface a frame shows, as the number of cells of a grid that hold a point.
  *
  * Where cells are much smaller than the points are apart, that is the number of points and says nothing of
@@ -92,9 +95,10 @@ npg_status npg_outside_restore(npg_outside *outside, const npg_record *in, const
 typedef struct npg_candidate {
     size_t at; /* place in the clouds */
     int64_t index, number;
-    bool is_followed; /* false: no surface could be made, or it was lost */
-    int64_t handles;  /* of the draft */
-    size_t pieces;    /* of the draft */
+    bool is_followed;    /* false: no surface could be made, or it was lost */
+    int64_t handles;     /* of the draft */
+    size_t pieces;       /* of the draft */
+    double unseen_share; /* of the draft's area */
     npg_judgement judgement;
 } npg_candidate;
 
@@ -107,7 +111,9 @@ void npg_candidates_list(npg_choice *choice, int64_t key, int64_t frame_count, c
 /* Whether no frame of the choice is in fewer pieces than this one. */
 bool npg_candidates_is_whole(const npg_choice *choice, const uint8_t *pieces, int64_t index);
 
-/* Place in the list of the one to take; scored: of the frame by score, count: none; is_side: of one depth camera. */
+/* Place in the list of the one to take; scored: of the frame by score, count: none; is_side: of one depth camera.
+ * Where the frame by score has not seen more than NPG_FEW of its draft, it stays if it can be followed at all: how
+ * Poisson closes what frames hide of the body says nothing. */
 size_t npg_candidates_best(const npg_candidate *list, size_t count, size_t scored, bool is_side);
 
 /* Try the candidates among the clouds.  *count: how many; *best: place in the list of the one to take;

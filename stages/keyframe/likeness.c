@@ -15,8 +15,7 @@ struct npg_likeness {
     npg_kdtree *tree;
 };
 
-/* The finite ones of at most `most` points, spread over their order. */
-static size_t spread_finite(float *out, size_t most, const float *points, size_t count)
+size_t npg_spread_finite(float *out, size_t most, const float *points, size_t count)
 {
     size_t spread = npg_points_spread(out, NULL, most, points, NULL, count), kept = 0;
     for (size_t i = 0; i < spread; i++) {
@@ -32,7 +31,7 @@ static npg_status take_mesh(npg_likeness *likeness, const npg_mesh *mesh, const 
 {
     NPG_TRY(npg_alloc_array(&likeness->verts, NPG_FOR_RUN, KEPT, 3 * sizeof *likeness->verts));
     likeness->whole_count = mesh->vert_count;
-    likeness->vert_count = spread_finite(likeness->verts, KEPT, mesh->vert_pos, mesh->vert_count);
+    likeness->vert_count = npg_spread_finite(likeness->verts, KEPT, mesh->vert_pos, mesh->vert_count);
     npg_box_local_to_unit(box, likeness->verts, likeness->verts, likeness->vert_count);
     return npg_kdtree_open(&likeness->tree, likeness->verts, likeness->vert_count);
 }
@@ -94,7 +93,7 @@ npg_status npg_likeness_dist(double *dist_unit, const npg_likeness *likeness, co
     float *points;
     *dist_unit = (double)INFINITY;
     NPG_TRY(npg_alloc_array(&points, NPG_FOR_RUN, KEPT, 3 * sizeof *points));
-    size_t count = spread_finite(points, KEPT, frame->pos_local, frame->point_count);
+    size_t count = npg_spread_finite(points, KEPT, frame->pos_local, frame->point_count);
     npg_box_local_to_unit(box, points, points, count);
     npg_status status = count ? compare(dist_unit, likeness, points, count) : NPG_OK;
     npg_release(&points);

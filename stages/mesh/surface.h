@@ -23,8 +23,8 @@ typedef struct npg_fused {
     float *colour_points, *colour_normals;
     uint8_t *colours;
     size_t colour_count; /* M */
-    /* Cubes near the reference that was followed which sensors saw to be empty, their middles; not there where no
-     * sensor's place is known. */
+    /* Cubes near the reference that was followed which sensors, or viewpoints, saw to be empty, their middles; not there
+     * where there are none. */
     float *empty; /* K x 3, owned, or NULL */
     size_t empty_count;
     bool sees_hidden; /* npg_viewpoints of the keyframe */

@@ -60,8 +60,8 @@ static const npg_option outlier_options[] = {
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
         "single one, what lies before the points is empty, and surface that can't be seen from there waits "
         "for frames that see it; none: nothing is known, and every frame has all sides; auto: the origin, "
-        "if the points look like one view from it; find: one sensor saw each frame, from a place that is "
-        "looked for"),
+        "if the points look like one view from it, else what the keyframe can be seen from looks for empty "
+        "space; find: one sensor saw each frame, from a place that is looked for"),
     {0}};
 /* clang-format on */
 

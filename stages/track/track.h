@@ -133,12 +133,12 @@ npg_status npg_visible_find(npg_visible *visible, uint8_t *is_seen, const npg_su
 /* Viewpoints: from where a cloud was seen, if nobody says so.
  *
  * Of directions d_k all around, C is a choice from which the points can be seen past the surface: again and again
- * the one that sees the most of those which no other does,
+ * the one that sees the most of those which no other does, and the least of the surface that has none,
  *
- *     k = argmax_k |{i : i not seen from C, i seen from d_k}|,
+ *     k = argmax_k |{i : i not seen from C, i seen from d_k}| - (the same of bare vertices, in points of the others),
  *
- * while these are more than NPG_FEW of them.  Not the sensors' own places, but what looks where they do: what is seen
- * from C and has no points is not there.  Not in the paper. */
+ * of those that add more than NPG_FEW of the points: what a sensor sees has some.  Not the sensors' own places, but
+ * what looks where they do: what is seen from C and has no points is not there.  Not in the paper. */
 
 #define NPG_VIEWPOINTS_MOST 64 /* a bit for each */
 
@@ -148,9 +148,9 @@ typedef struct npg_viewpoints {
     bool sees_hidden; /* more than NPG_FEW of the points are seen from nowhere: no sensor's, and all over */
 } npg_viewpoints;
 
-/* mesh: a surface through the points (N x 3, N >= 1, with outward unit normals), in the same pose and coordinates;
- * offset: what is nearer than that hides nothing.  Up to 4000 points are asked.  Equal input gives equal bits.
- * NPG_MEMORY. */
+/* mesh: a surface through the points (N x 3, N >= 1, with outward unit normals), in the same pose and coordinates,
+ * with its normals and what is unseen of it (nothing where either is NULL); offset: what is nearer than that hides
+ * nothing.  Up to 4000 points are asked.  Equal input gives equal bits.  NPG_MEMORY. */
 npg_status npg_viewpoints_find(npg_viewpoints *found, const npg_mesh *mesh, const float *points,
                                const float *normals, size_t count, double offset);
 

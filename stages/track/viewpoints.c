@@ -19,48 +19,61 @@ void npg_viewpoints_place(float *sensors, const npg_viewpoints *viewpoints, cons
 
 typedef struct search {
     npg_arena arena;
-    npg_viewpoints *found, all; /* all: those that are tried                     */
+    npg_viewpoints *found, all; /* all: those that are tried */
     npg_surface *surface;
-    float *points, *normals; /* N x 3                                         */
-    uint64_t *views;         /* N: bit k where the k-th sees the point        */
-    uint8_t *is_seen;        /* N                                             */
+    float *places, *normals; /* N x 3: points, then surface that has none    */
+    uint64_t *views;         /* N: bit k where the k-th sees it              */
+    uint8_t *is_seen;        /* N                                            */
     float sensors[3 * NPG_VIEWPOINTS_MOST];
     npg_visible visible;
-    size_t count; /* N */
+    size_t point_count, count; /* N */
+    double points_per_vert;    /* on surface that has some */
 } search;
+
+static void take_bare(search *s, const npg_mesh *mesh)
+{
+    s->count = s->point_count;
+    for (size_t v = 0; v < mesh->vert_count && mesh->vert_unseen && mesh->vert_normals; v++) {
+        if (!mesh->vert_unseen[v]) continue;
+        memcpy(s->places + 3 * s->count, mesh->vert_pos + 3 * v, 3 * sizeof *s->places);
+        memcpy(s->normals + 3 * s->count++, mesh->vert_normals + 3 * v, 3 * sizeof *s->normals);
+    }
+    s->points_per_vert = (double)s->point_count / (double)(mesh->vert_count + s->point_count - s->count);
+}
 
 static npg_status find_views(search *s, double offset)
 {
     for (size_t k = 0; k < s->all.count; k++) {
-        NPG_TRY(npg_visible_find(&s->visible, s->is_seen, s->surface, s->sensors + 3 * k, 1, s->points, NULL,
+        NPG_TRY(npg_visible_find(&s->visible, s->is_seen, s->surface, s->sensors + 3 * k, 1, s->places, NULL,
                                  s->normals, s->count, offset));
         for (size_t i = 0; i < s->count; i++) s->views[i] |= (uint64_t)s->is_seen[i] << k;
     }
     return NPG_OK;
 }
 
-/* Points that the k-th sees and none of the chosen. */
-static size_t gain(const search *s, uint64_t chosen, size_t k)
+/* Of the places first..end-1 those that the k-th sees and none of the chosen. */
+static double gain(const search *s, uint64_t chosen, size_t k, size_t first, size_t end)
 {
-    size_t count = 0;
-    for (size_t i = 0; i < s->count; i++) count += !(s->views[i] & chosen) && (s->views[i] >> k & 1);
+    double count = 0;
+    for (size_t i = first; i < end; i++) count += !(s->views[i] & chosen) && (s->views[i] >> k & 1);
     return count;
 }
 
 static void choose(search *s)
 {
-    double few = NPG_FEW * (double)s->count;
+    double few = NPG_FEW * (double)s->point_count;
     uint64_t chosen = 0;
-    size_t hidden = 0;
-    for (size_t i = 0; i < s->count; i++) hidden += !s->views[i];
+    size_t hidden = 0, best = 0;
+    for (size_t i = 0; i < s->point_count; i++) hidden += !s->views[i];
     s->found->sees_hidden = (double)hidden > few;
     while (!s->found->sees_hidden) {
-        size_t best = 0, most = 0;
+        double most = -HUGE_VAL;
         for (size_t k = 0; k < s->all.count; k++) {
-            size_t gained = gain(s, chosen, k);
-            if (gained > most) most = gained, best = k;
+            double gained = gain(s, chosen, k, 0, s->point_count);
+            double net = gained - s->points_per_vert * gain(s, chosen, k, s->point_count, s->count);
+            if (gained > few && net > most) most = net, best = k;
         }
-        if (!((double)most > few)) return;
+        if (!(most > -HUGE_VAL)) return;
         chosen |= (uint64_t)1 << best;
         memcpy(s->found->directions + 3 * s->found->count++, s->all.directions + 3 * best,
                3 * sizeof *s->all.directions);
@@ -71,15 +84,17 @@ npg_status npg_viewpoints_find(npg_viewpoints *found, const npg_mesh *mesh, cons
                                const float *normals, size_t count, double offset)
 {
     search s = {.arena.purpose = NPG_FOR_MESH, .found = found, .all.count = NPG_VIEWPOINTS_MOST};
+    size_t most = ASKED_MOST + mesh->vert_count;
     *found = (npg_viewpoints){0};
-    s.points = npg_arena_take(&s.arena, ASKED_MOST, 3 * sizeof *s.points);
-    s.normals = npg_arena_take(&s.arena, ASKED_MOST, 3 * sizeof *s.normals);
-    s.views = npg_arena_take(&s.arena, ASKED_MOST, sizeof *s.views);
-    s.is_seen = npg_arena_take(&s.arena, ASKED_MOST, 1);
-    npg_visible_open(&s.visible, &s.arena, ASKED_MOST);
+    s.places = npg_arena_take(&s.arena, most, 3 * sizeof *s.places);
+    s.normals = npg_arena_take(&s.arena, most, 3 * sizeof *s.normals);
+    s.views = npg_arena_take(&s.arena, most, sizeof *s.views);
+    s.is_seen = npg_arena_take(&s.arena, most, 1);
+    npg_visible_open(&s.visible, &s.arena, most);
     npg_status status = npg_arena_status(&s.arena);
     if (!status) {
-        s.count = npg_points_spread(s.points, s.normals, ASKED_MOST, points, normals, count);
+        s.point_count = npg_points_spread(s.places, s.normals, ASKED_MOST, points, normals, count);
+        take_bare(&s, mesh);
         for (size_t k = 0; k < s.all.count; k++)
             npg_direction_spread(s.all.directions + 3 * k, k, s.all.count);
         npg_viewpoints_place(s.sensors, &s.all, points, count);

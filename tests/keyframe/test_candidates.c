@@ -140,12 +140,27 @@ static void before_one_camera_the_frame_by_score_stays_but_for_chance(void **sta
     assert_int_equal(npg_candidates_best(fails, 1, 0, true), 0);
 }
 
+/* What Poisson made of it is not compared, but a frame that can't be followed is none. */
+static void a_frame_that_hides_much_stays(void **state)
+{
+    (void)state;
+    npg_candidate list[] = {judged(0.3, 0.001, 1), judged(0.1, 0, 1)};
+    list[0].unseen_share = 0.004;
+    assert_int_equal(npg_candidates_best(list, 2, 0, false), 1);
+    list[0].unseen_share = 0.03;
+    assert_int_equal(npg_candidates_best(list, 2, 0, false), 0);
+    assert_int_equal(npg_candidates_best(list, 2, 0, true), 1); /* one camera: by its images */
+    list[0].is_followed = false;
+    assert_int_equal(npg_candidates_best(list, 2, 0, false), 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_score_alone_takes_touching_feet),
         cmocka_unit_test(a_frame_with_feet_apart_is_chosen),
         cmocka_unit_test(a_frame_whose_leg_is_cut_off_is_not_chosen),
+        cmocka_unit_test(a_frame_that_hides_much_stays),
         cmocka_unit_test(before_one_camera_the_frame_by_score_stays_but_for_chance),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

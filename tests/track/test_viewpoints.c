@@ -15,17 +15,22 @@
 
 #define OFFSET 0.02
 
-/* The points with a height between the two, of a ball whose height is 2, drawn in by `scale`. */
-static npg_viewpoints of_ball(float low, float high, float scale)
+/* The points with a height between the two, of a ball whose height is 2, drawn in by `scale`.  bare: of the rest the half
+ * on that side along y is marked as unseen; 0: nothing is. */
+static npg_viewpoints of_half(float low, float high, float scale, float bare)
 {
     static float points[3 * 4000], normals[3 * 4000];
     npg_mesh *ball = ball_mesh(39, 80);
     npg_viewpoints found;
     size_t count = 0;
+    assert_int_equal(npg_alloc(&ball->vert_unseen, NPG_FOR_MESH, ball->vert_count), NPG_OK);
     for (size_t i = 0; i < ball->vert_count; i++) {
         const float *p = ball->vert_pos + 3 * i;
         float length = sqrtf(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-        if (p[2] / length < low || p[2] / length > high) continue;
+        if (p[2] / length < low || p[2] / length > high) {
+            ball->vert_unseen[i] = p[1] * bare > 0;
+            continue;
+        }
         for (size_t a = 0; a < 3; a++) {
             points[3 * count + a] = scale * p[a];
             normals[3 * count + a] = p[a] / length;
@@ -35,6 +40,11 @@ static npg_viewpoints of_ball(float low, float high, float scale)
     assert_int_equal(npg_viewpoints_find(&found, ball, points, normals, count, OFFSET), NPG_OK);
     npg_mesh_unref(&ball);
     return found;
+}
+
+static npg_viewpoints of_ball(float low, float high, float scale)
+{
+    return of_half(low, high, scale, 0);
 }
 
 static double height_most(const npg_viewpoints *v)
@@ -51,6 +61,17 @@ static void points_around_are_seen_from_around(void **state)
     assert_true(belt.count >= 3 && belt.count <= 6);
     assert_true(height_most(&belt) < 0.6);
     assert_false(belt.sees_hidden);
+}
+
+/* A cap is seen from many sides: from where the least of what has no points is seen with it. */
+static void bare_surface_is_looked_past(void **state)
+{
+    (void)state;
+    for (int side = -1; side <= 1; side += 2) {
+        npg_viewpoints cap = of_half(0.8f, 1, 1, (float)side);
+        assert_int_equal(cap.count, 1);
+        assert_true(side * cap.directions[1] < -0.2 && cap.directions[2] > 0.5);
+    }
 }
 
 static void points_of_one_side_are_seen_from_there(void **state)
@@ -116,6 +137,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_around_are_seen_from_around),
+        cmocka_unit_test(bare_surface_is_looked_past),
         cmocka_unit_test(points_of_one_side_are_seen_from_there),
         cmocka_unit_test(points_all_over_are_seen_from_all_sides),
         cmocka_unit_test(points_inside_are_seen_from_nowhere),
