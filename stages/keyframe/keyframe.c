@@ -532,7 +532,7 @@ static const npg_option options[] = {
         "--reference, the frame that it is nearest to"),
     NPG_KEY(CHOICE, "keyframe-choice", AT(choice),     "judged", "paper|judged",
         "Take the frame with the paper's score (paper), "
-        "or the one that shows most surface, if of several its own does not fare worse in the others (judged)"),
+        "or the one that shows most surface, unless that of another fares better in the others (judged)"),
     NPG_KEY(INT,    "window",          AT(window),     "24",    -1, 1e6,  NULL,
         "Frames that are solved together; 0: all of them in one window; "
         "-1: so up to 60 frames, and windows of 24 where there are more"),
