@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "evaluate/evaluate_internal.h"
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
 #include "pipeline/order.h"
@@ -20,6 +21,8 @@ typedef struct evaluation {
     npg_mesh *first, *first_truth; /* counted references */
     uint32_t *truth_of;            /* owned */
     npg_mesh_neighbours ring;
+    uint32_t (*edges)[2]; /* owned */
+    size_t edge_count;
     float *star_rest, *star_now;                 /* of the largest star, x 3                     */
     float *before[2];                            /* the last frame's positions, and those before */
     float *areas;                                /* frames x F, owned                            */
@@ -91,22 +94,6 @@ static double jitter_of(const evaluation *e, const float *after)
     return sum / (double)e->first->vert_count / e->metrics.diagonal;
 }
 
-/* Each edge once, from its lower vertex. */
-static double edge_change_of(const evaluation *e, const float *pos)
-{
-    const float *rest = e->first->vert_pos;
-    double sum = 0, count = 0;
-    for (size_t v = 0; v < e->first->vert_count; v++)
-        for (uint32_t i = e->ring.start[v]; i < e->ring.start[v + 1]; i++) {
-            size_t a = 3 * v, b = 3 * (size_t)e->ring.of[i];
-            if (b < a) continue;
-            double before = fmax(npg_vec3_distance(rest + a, rest + b), 1e-30);
-            sum += fabs(npg_vec3_distance(pos + a, pos + b) / before - 1);
-            count++;
-        }
-    return sum / count;
-}
-
 /* A vertex and its neighbours, as differences from it. */
 static size_t take_star(const evaluation *e, float *out, const float *pos, size_t v)
 {
@@ -165,7 +152,7 @@ static npg_status add_motion(evaluation *e, const npg_mesh *mesh)
         e->before[0] = oldest;
     }
     if (!e->topology_last) return NPG_OK;
-    e->all.edge += edge_change_of(e, mesh->vert_pos);
+    e->all.edge += npg_edge_change(e->first->vert_pos, mesh->vert_pos, e->edges, e->edge_count);
     e->all.rigidity += rigid_of(e, mesh->vert_pos);
     NPG_TRY(npg_grow(&e->areas, &e->area_room, t + 1, faces * sizeof(float), NPG_FOR_MESH));
     for (size_t f = 0; f < faces; f++)
@@ -204,6 +191,7 @@ static npg_status begin(evaluation *e, npg_mesh *predicted, npg_mesh *truth)
     e->vertices_last = e->topology_last = true;
     e->has_corr = !e->s.points_only;
     NPG_TRY(npg_mesh_neighbours_open(&e->ring, predicted));
+    NPG_TRY(npg_mesh_edges(&e->edges, &e->edge_count, predicted->faces, predicted->face_count));
     for (size_t v = 0; v < verts; v++)
         if (e->ring.start[v + 1] - e->ring.start[v] > most) most = e->ring.start[v + 1] - e->ring.start[v];
     for (int i = 0; i < 2; i++) e->before[i] = npg_arena_take(&e->arena, verts, 3 * sizeof(float));
@@ -303,6 +291,7 @@ npg_status npg_eval(npg_eval_figures *all, const npg_eval_settings *settings)
     npg_mesh_unref(&e.first_truth);
     npg_mesh_neighbours_close(&e.ring);
     npg_release(&e.truth_of);
+    npg_release(&e.edges);
     npg_release(&e.areas);
     npg_arena_release(&e.arena);
     NPG_TRY(status);

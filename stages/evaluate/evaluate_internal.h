@@ -28,6 +28,9 @@ void npg_shape_close(npg_shape **shape);
  * edge_change is the mean of |length / reference length - 1|. */
 void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float *vert_unit);
 
+/* The latter, of edges that have a length at rest. */
+double npg_edge_change(const float *rest, const float *now, uint32_t (*edges)[2], size_t edge_count);
+
 /* Misfit: finds where in a frame the surface fails in one place, which is how a change of topology shows:
  * noise, outliers and a poor fit are spread all over.
  *

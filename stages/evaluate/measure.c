@@ -87,19 +87,14 @@ void npg_shape_close(npg_shape **slot)
     npg_object_close(slot);
 }
 
-static double length_of(const float *vert_pos, const uint32_t edge[2])
-{
-    return npg_vec3_distance(vert_pos + 3 * (size_t)edge[0], vert_pos + 3 * (size_t)edge[1]);
-}
-
-static double edge_change(const npg_shape *shape, const float *vert_unit)
+double npg_edge_change(const float *rest, const float *now, uint32_t (*edges)[2], size_t edge_count)
 {
     double sum = 0;
     size_t count = 0;
-    for (size_t e = 0; e < shape->edge_count; e++) {
-        double before = length_of(shape->reference->vert_pos, shape->edges[e]);
+    for (size_t e = 0; e < edge_count; e++) {
+        double before = npg_edge_length(rest, edges[e]);
         if (!(before > 0)) continue;
-        sum += fabs(length_of(vert_unit, shape->edges[e]) / before - 1);
+        sum += fabs(npg_edge_length(now, edges[e]) / before - 1);
         count++;
     }
     return count ? sum / (double)count : 0;
@@ -120,7 +115,7 @@ void npg_shape_measure(const npg_shape *shape, npg_figures *figures, const float
         if (shape->cosines[f] > -NPG_AGAINST && cosine_of(shape, f) < NPG_AGAINST) flipped += shape->areas[f];
     figures->flipped_share = all > 0 ? flipped / all : 0;
     figures->stretched_share = all > 0 ? stretched / all : 0;
-    figures->edge_change = edge_change(shape, vert_unit);
+    figures->edge_change = npg_edge_change(mesh->vert_pos, vert_unit, shape->edges, shape->edge_count);
 }
 
 /* ---- the figures' room ---- */

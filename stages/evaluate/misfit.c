@@ -30,11 +30,6 @@ struct npg_misfit_finder {
     uint8_t *flags;    /* V                                                */
 };
 
-static double length_of(const float *vert_pos, const uint32_t edge[2])
-{
-    return npg_vec3_distance(vert_pos + 3 * (size_t)edge[0], vert_pos + 3 * (size_t)edge[1]);
-}
-
 static npg_status measure_reference(npg_misfit_finder *f)
 {
     const npg_mesh *mesh = f->reference;
@@ -157,8 +152,8 @@ static npg_status find_stretched(npg_misfit_finder *f, npg_misfit *misfit, const
     for (size_t e = 0; e < f->edge_count; e++) {
         uint32_t a = f->edges[e][0], b = f->edges[e][1];
         if (!f->flags[a] || !f->flags[b]) continue;
-        if (!(length_of(frame->vert_unit, f->edges[e]) >
-              STRETCH_LEAST * length_of(mesh->vert_pos, f->edges[e])))
+        if (!(npg_edge_length(frame->vert_unit, f->edges[e]) >
+              STRETCH_LEAST * npg_edge_length(mesh->vert_pos, f->edges[e])))
             continue;
         f->flags[a] |= ENDS_STRETCHED;
         f->flags[b] |= ENDS_STRETCHED;

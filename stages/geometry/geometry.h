@@ -63,6 +63,12 @@ static inline double npg_vec3_distance(const float a[3], const float b[3])
     return npg_vec3_length(d);
 }
 
+/* edge: its vertices. */
+static inline double npg_edge_length(const float *vert_pos, const uint32_t edge[2])
+{
+    return npg_vec3_distance(vert_pos + 3 * (size_t)edge[0], vert_pos + 3 * (size_t)edge[1]);
+}
+
 /* out = a x b; out is neither of them. */
 static inline void npg_vec3_cross(double out[3], const double a[3], const double b[3])
 {
