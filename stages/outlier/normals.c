@@ -70,13 +70,13 @@ npg_status npg_normals_estimate(float *normals, const float *points, size_t n, i
 /* ---- sensor ---- */
 
 void npg_normals_face_sensor(float *normals, size_t *flipped, const float *points, size_t n,
-                             const double sensor[3])
+                             const float sensor[3])
 {
     *flipped = 0;
     for (size_t i = 0; i < n; i++) {
         double toward = 0;
         for (size_t a = 0; a < 3; a++)
-            toward += (double)normals[3 * i + a] * (sensor[a] - (double)points[3 * i + a]);
+            toward += (double)normals[3 * i + a] * ((double)sensor[a] - (double)points[3 * i + a]);
         if (toward >= 0) continue;
         for (size_t a = 0; a < 3; a++) normals[3 * i + a] = -normals[3 * i + a];
         ++*flipped;

@@ -22,7 +22,7 @@ npg_status npg_normals_estimate(float *normals, const float *points, size_t poin
 
 /* Turn every normal toward the sensor (same coordinates as the points).  *flipped counts the turned ones. */
 void npg_normals_face_sensor(float *normals, size_t *flipped, const float *points, size_t point_count,
-                             const double sensor[3]);
+                             const float sensor[3]);
 
 /* Winding: unit normals of all points together, outward of what they enclose, and of what is open to one side
  * (sheets.c): winding.c has the formula.  given (N x 3, unit, some on the wrong side): where to begin, and then what

@@ -60,8 +60,8 @@ static const npg_option outlier_options[] = {
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
         "single one, what lies before the points is empty, and surface that can't be seen from there waits "
         "for frames that see it; none: nothing is known, and every frame has all sides; auto: the origin, "
-        "if the points look like one view from it, else what the keyframe can be seen from looks for empty "
-        "space; find: one sensor saw each frame, from a place that is looked for"),
+        "if the points look like one view from it, else, if the keyframe's surface lacks points, what it can be "
+        "seen from; find: one sensor saw each frame, from a place that is looked for"),
     {0}};
 /* clang-format on */
 
@@ -125,22 +125,20 @@ static void repair_directions(float *normals, size_t *bad, const float *estimate
     }
 }
 
-/* The one place that all points were seen from, given or found.  A rig's own normals face its sensors
- * already. */
-static bool find_sensor(const npg_frame *frame, double sensor[3])
+/* The one place that all points were seen from, given or found; NULL: there is none.  A rig's own normals face its
+ * sensors already. */
+static const float *lone_sensor(const npg_frame *frame)
 {
-    if (frame->sensor_count != 1 || frame->sensors) return false;
-    for (int a = 0; a < 3; a++) sensor[a] = (double)frame->sensor_local[a];
-    return true;
+    return frame->sensor_count == 1 && !frame->sensors ? frame->sensor_local : NULL;
 }
 
 static npg_status make_normals(npg_frame *frame)
 {
     size_t n = frame->point_count, turned;
-    double sensor[3];
+    const float *sensor = lone_sensor(frame);
     NPG_TRY(npg_alloc_array(&frame->normals, NPG_FOR_FRAMES, n, 3 * sizeof(float)));
     frame->cleaning.normals_estimated = n;
-    if (!find_sensor(frame, sensor)) return npg_normals_make(frame->normals, frame->pos_local, n);
+    if (!sensor) return npg_normals_make(frame->normals, frame->pos_local, n);
     NPG_TRY(npg_normals_estimate(frame->normals, frame->pos_local, n, NPG_PATCH));
     npg_normals_face_sensor(frame->normals, &turned, frame->pos_local, n, sensor);
     return NPG_OK;
@@ -151,7 +149,7 @@ static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
     const outlier_state *s = npg_worker_state(worker);
     size_t n = frame->point_count, bad;
     float *estimate;
-    double sensor[3];
+    const float *sensor = lone_sensor(frame);
     NPG_TRY(npg_alloc_array(&estimate, NPG_FOR_FRAMES, n, 3 * sizeof *estimate));
     npg_status status = npg_normals_estimate(estimate, frame->pos_local, n, NPG_PATCH);
     if (!status) repair_directions(frame->normals, &bad, estimate, n);
@@ -160,12 +158,10 @@ static npg_status mend_normals(npg_worker *worker, npg_frame *frame)
     frame->cleaning.normals_given = n - bad;
     frame->cleaning.normals_estimated = bad;
     if (frame->has_sure_normals && s->sensor_kind == SENSOR_AUTO) return NPG_OK;
-    if (find_sensor(frame, sensor)) {
-        npg_normals_face_sensor(frame->normals, &frame->cleaning.normals_flipped, frame->pos_local, n,
-                                sensor);
-        return NPG_OK;
-    }
-    return npg_normals_mend(frame->normals, &frame->cleaning.normals_flipped, frame->pos_local, n);
+    if (!sensor)
+        return npg_normals_mend(frame->normals, &frame->cleaning.normals_flipped, frame->pos_local, n);
+    npg_normals_face_sensor(frame->normals, &frame->cleaning.normals_flipped, frame->pos_local, n, sensor);
+    return NPG_OK;
 }
 
 static npg_status make_or_mend_normals(npg_worker *worker, npg_frame *frame)
@@ -191,7 +187,7 @@ static bool needs_normals(npg_worker *worker, const npg_frame *frame)
     if (npg_worker_pass(worker) == NPG_PASS_CHOOSE)
         return npg_choice_is_candidate(&facts->choice, frame->index);
     if (npg_worker_pass(worker) != NPG_PASS_SOLVE && npg_worker_pass(worker) != NPG_PASS_FUSE) return false;
-    if (frame->sensor_count == 1 && !frame->sensors) return true; /* they face it: sure, and needed to grow */
+    if (lone_sensor(frame)) return true; /* they face it: sure, and needed to grow */
     bool is_planned_key = facts->plan.frame_count && frame->index == facts->plan.key;
     return s->normals_for == FOR_ALL || frame->is_key || is_planned_key;
 }

@@ -187,7 +187,8 @@ static void a_sensor_decides(void **state)
     assert_true(yes);
     memcpy(normals, truth, sizeof truth);
     random_sides(&r);
-    npg_normals_face_sensor(normals, &flipped, points, seen, sensor);
+    npg_normals_face_sensor(normals, &flipped, points, seen,
+                            (const float[]){(float)sensor[0], (float)sensor[1], (float)sensor[2]});
     assert_true(flipped > seen / 4);
     for (size_t i = 0; i < seen; i++) assert_true(dot_of(i) > 0.99);
 }
