@@ -22,7 +22,6 @@
 
 #define SHOWN_SCORES 5
 #define NO_NUMBER    (-1)
-#define MIDDLE_REACH 24 /* frames from the middle, within which it hardly weighs against area */
 
 enum { CHOICE_PAPER, CHOICE_JUDGED };
 
@@ -208,34 +207,28 @@ static npg_status score_by_mesh(npg_worker *worker, candidate *c, const npg_fram
     return NPG_OK;
 }
 
-/* Whether the keyframe is the one that shows most surface: before several sensors, known or not, bodies hide parts of
- * themselves, the more the narrower they stand.  One sensor shows most of what it sees best. */
-static bool goes_by_area(const npg_worker *worker)
-{
-    return has_candidates(worker) && npg_worker_facts(worker)->sensor_count_max != 1;
-}
-
 /* Whether surfaces of several frames may be compared for the keyframe. */
 static bool compares(const npg_worker *worker)
 {
     return has_candidates(worker) && npg_worker_facts(worker)->sensor_count_max < 2;
 }
 
-/* The paper's score: many cells, near the middle in time.  Areas differ by a few per cent only, so there the middle weighs
- * less. */
+/* The paper's score: many cells, near the middle in time.  Before several sensors, known or not, bodies hide parts of
+ * themselves, the more the narrower they stand (one shows most of what it sees best): there area counts, and as areas differ
+ * by a few per cent only, the middle less, by a fifth at the ends. */
 static npg_status measure_extent(npg_worker *worker, candidate *scored, const npg_frame *frame)
 {
     keyframe_state *state = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    bool by_area = goes_by_area(worker);
+    bool by_area = has_candidates(worker) && facts->sensor_count_max != 1;
     double away = (double)frame->index - (double)facts->planned_count / 2;
-    double share = by_area ? away / (double)facts->planned_count : 0;
-    if (by_area) away = fmax(0, fabs(away) - MIDDLE_REACH);
+    double share = away / (double)facts->planned_count;
     if (!state->extent) NPG_TRY(npg_extent_open(&state->extent, &facts->box, frame));
     *scored = (candidate){.index = frame->index, .number = frame->number};
     scored->cell_count =
         by_area ? npg_extent_area(state->extent, frame) : npg_extent_papers(state->extent, frame);
-    scored->score = (double)scored->cell_count * exp(-0.001 * away * away) / (1 + share * share);
+    scored->score =
+        (double)scored->cell_count * (by_area ? 1 / (1 + share * share) : exp(-0.001 * away * away));
     return NPG_OK;
 }
 
