@@ -55,6 +55,18 @@ typedef struct npg_choice {
     bool is_tried;  /* the key alone is read: others are compared if its pass says that one could do better */
 } npg_choice;
 
+#define NPG_VIEWPOINTS_MOST NPG_FRAME_SENSORS_MOST /* and a bit for each */
+
+/* From where the keyframe was seen, if nobody says so (track/track.h). */
+typedef struct npg_viewpoints {
+    size_t count;                               /* 0 where points are hidden                        */
+    double directions[3 * NPG_VIEWPOINTS_MOST]; /* unit vectors, from the cloud's middle            */
+    bool
+        sees_hidden; /* more than NPG_FEW of the points are seen from nowhere: no sensor's, and all over       */
+    bool
+        explain_bare; /* most of the surface that has no points can't be seen from them; else there are holes */
+} npg_viewpoints;
+
 /* Whether the frame with this index is one of the candidates. */
 static inline bool npg_choice_is_candidate(const npg_choice *choice, int64_t index)
 {
@@ -122,6 +134,7 @@ typedef struct npg_facts {
                             and in the solving one, before the first frame is passed on */
     int64_t reference_key; /* index of the frame that it is made around */
     double unseen_share;   /* share of the reference's area that no point of its frame saw */
+    npg_viewpoints viewpoints; /* of the keyframe's own surface */
     /* evaluate, at the end of a fusing pass and of the solving one; forward and backward from the keyframe */
     bool has_changed[2];   /* the reference does not explain the capture any more ... */
     int64_t changed_at[2]; /* ... from the frame of this index on                     */

@@ -220,10 +220,10 @@ static npg_status fit_pose(npg_worker *worker, npg_waiting *w, npg_side *at)
 }
 
 /* Whether points are gathered for a reference that is a side of the body. */
-static bool gathers_side(const npg_worker *worker, size_t sensor_count)
+static bool gathers_side(const npg_worker *worker)
 {
     const state *s = npg_worker_state(worker);
-    return npg_worker_pass(worker) == NPG_PASS_FUSE && sensor_count && npg_tracker_is_open(s->tracker);
+    return ends_late(npg_worker_facts(worker), npg_worker_pass(worker)) && npg_tracker_is_open(s->tracker);
 }
 
 /* Whether it has places for enough of the frame's points. */
@@ -271,7 +271,7 @@ static npg_status align_frame(npg_worker *worker, npg_frame *frame)
     if (!is_key) npg_side_step_on(at, w->frame.index);
     NPG_TRY(fit_pose(worker, w, at));
     bool is_reached = true;
-    if (!is_key && gathers_side(worker, w->cloud.sensor_count)) NPG_TRY(reaches(&is_reached, worker, w));
+    if (!is_key && gathers_side(worker)) NPG_TRY(reaches(&is_reached, worker, w));
     if (!is_reached) leave_past(w, at);
     at->index = w->frame.index;
     if (is_key) npg_side_copy(s->group.ways[1], at);
@@ -315,7 +315,7 @@ static npg_status finish_group(npg_worker *worker)
 {
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
-    bool is_of_one_side = facts->brief.is_side || gathers_side(worker, facts->sensor_count_max);
+    bool is_of_one_side = facts->brief.is_side || gathers_side(worker);
     npg_recover_frame *frames;
     NPG_TRY(npg_alloc_array(&frames, NPG_FOR_FIT, s->group.count + NPG_GROUP_FIXED, sizeof *frames));
     size_t count = npg_group_list(&s->group, frames);

@@ -14,7 +14,6 @@
  * Not in the paper, whose reference is the surface of one frame. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "fuse/fuse_internal.h"
 #include "geometry/geometry.h"
@@ -22,8 +21,6 @@
 #include "mesh/surface.h"
 #include "pipeline/order.h"
 #include "track/track.h"
-
-_Static_assert(NPG_VIEWPOINTS_MOST <= NPG_FRAME_SENSORS_MOST, "both are sensors of a frame");
 
 #define SIDE_LEAST   0.25 /* of a cell, in spacings of the keyframe's points */
 #define FRAMES_SHARE 0.05 /* of all frames must have seen a place: wrong motion shows others in a few */
@@ -45,10 +42,9 @@ typedef struct state {
     npg_skin *skin;
     npg_cells *cells;
     npg_carving *empty;        /* NULL: nothing was looked at from a known place */
-    npg_viewpoints viewpoints; /* of the keyframe, where nobody says where sensors stood */
+    int64_t key;               /* index of the keyframe */
     npg_free_space *key_space; /* what the keyframe's images say; NULL: it has none */
     npg_colour_cells *colours; /* NULL: the points have no colours, or none are wanted */
-    int64_t key;               /* index of the keyframe */
     double spacing, noise;     /* of the keyframe's points */
     double usual;              /* mean of the frames' median distances */
     int64_t frames, misaligned, points, strays;
@@ -140,12 +136,12 @@ static npg_status look_around(npg_worker *worker, const cloud *c, const npg_fram
     state *s = npg_worker_state(worker);
     const npg_facts *facts = npg_worker_facts(worker);
     float at[3 * NPG_FRAME_SENSORS_MOST];
-    size_t count = frame->sensor_count ? frame->sensor_count : s->viewpoints.count;
+    size_t count = frame->sensor_count ? frame->sensor_count : facts->viewpoints.count;
     if (!count || (frame->sensors && !frame->views)) return NPG_OK;
     if (frame->sensor_count)
         npg_box_local_to_unit(&facts->box, at, frame->sensor_local, count);
     else
-        npg_viewpoints_place(at, &s->viewpoints, c->points, c->count);
+        npg_viewpoints_place(at, &facts->viewpoints, c->points, c->count);
     npg_seen seen = {.sensors = at,
                      .sensor_count = count,
                      .points = c->points,
@@ -168,17 +164,6 @@ static size_t most_cells(const npg_facts *facts)
     return points < NPG_FUSED_MOST ? points : NPG_FUSED_MOST;
 }
 
-/* Where nobody says where sensors stood, nor that none did. */
-static npg_status find_viewpoints(npg_worker *worker, const cloud *key)
-{
-    state *s = npg_worker_state(worker);
-    const npg_facts *facts = npg_worker_facts(worker);
-    const char *sensor = npg_options_get(npg_worker_options(worker), "sensor");
-    if (facts->sensor_count_max || !key->normals || !strcmp(sensor, "none")) return NPG_OK;
-    return npg_viewpoints_find(&s->viewpoints, facts->reference, key->points, key->normals, key->count,
-                               NPG_SAMPLED * s->spacing);
-}
-
 static npg_status open_gathering(npg_worker *worker, const cloud *key, const npg_frame *frame)
 {
     state *s = npg_worker_state(worker);
@@ -190,7 +175,6 @@ static npg_status open_gathering(npg_worker *worker, const cloud *key, const npg
     double side = fmax(SIDE_LEAST, 1 / sqrt((double)facts->planned_count)); /* for a point of all frames */
     NPG_TRY(npg_cells_open(&s->cells, side * s->spacing, most_cells(facts)));
     NPG_TRY(npg_skin_open(&s->skin, facts->reference));
-    NPG_TRY(find_viewpoints(worker, key));
     if (facts->sensor_count_max && npg_skin_is_open(s->skin))
         s->grow_dist =
             NPG_NEARBY_SHARE * npg_points_diagonal(facts->reference->vert_pos, facts->reference->vert_count);
@@ -259,7 +243,6 @@ static npg_status collect(npg_worker *worker, npg_fused *fused)
     fused->spacing_unit = npg_cells_side(s->cells);
     fused->key_spacing_unit = s->spacing;
     fused->key_noise_unit = s->noise;
-    fused->sees_hidden = s->viewpoints.sees_hidden;
     NPG_TRY(npg_cells_means(s->cells, fused->points, fused->normals, &fused->count, frames_least));
     return s->grow_dist > 0 ? drop_scattered(fused, fmax(DENSE_SPACINGS * s->spacing,
                                                          NPG_VOTE_CELLS * fused->spacing_unit))
@@ -278,8 +261,9 @@ static npg_status collect_colours(const state *s, npg_fused *fused)
     return NPG_OK;
 }
 
-static npg_status collect_empty(const state *s, npg_fused *fused)
+static npg_status collect_empty(const npg_worker *worker, npg_fused *fused)
 {
+    const state *s = npg_worker_state(worker);
     size_t most = s->empty ? npg_carving_count(s->empty) : 0;
     if (!most) return NPG_OK;
     NPG_TRY(npg_alloc_array(&fused->empty, NPG_FOR_MESH, most, 3 * sizeof(float)));
@@ -287,7 +271,7 @@ static npg_status collect_empty(const state *s, npg_fused *fused)
     /* by viewpoints that were found, not known, more must say so */
     fused->empty_count =
         npg_carving_find(s->empty, fused->empty, s->frames < 2 * NPG_CONFIRMED ? 1 : NPG_CONFIRMED,
-                         s->viewpoints.count ? NPG_MAJORITY : 1 - NPG_MOST);
+                         npg_worker_facts(worker)->viewpoints.count ? NPG_MAJORITY : 1 - NPG_MOST);
     return NPG_OK;
 }
 
@@ -315,7 +299,7 @@ static npg_status publish(npg_worker *worker)
     NPG_TRY(npg_alloc(&fused, NPG_FOR_MESH, sizeof *fused));
     npg_status status = collect(worker, fused);
     if (!status) status = collect_colours(s, fused);
-    if (!status) status = collect_empty(s, fused);
+    if (!status) status = collect_empty(worker, fused);
     if (status) {
         npg_fused_close(&fused);
         return status;

@@ -1,6 +1,7 @@
 /* Mesh: the reference surface.  The stage says when one is made and from which points, takes the user's own
  * mesh instead, puts it into the run's facts and lets all chunks pass. */
 #include <math.h>
+#include <string.h>
 
 #include "geometry/geometry.h"
 #include "ingest/ingest.h"
@@ -392,6 +393,34 @@ static npg_status try_larger_cells(making *m)
     return status == NPG_DIVERGED || status == NPG_FAILED ? NPG_OK : status;
 }
 
+/* ---- viewpoints ---- */
+
+/* Where nobody says where sensors stood, nor that none did, and there is surface that no point saw. */
+static npg_status find_viewpoints(const making *m)
+{
+    npg_viewpoints *found = npg_own(m->worker, viewpoints);
+    const npg_point_set *p = &m->set;
+    const char *sensor = npg_options_get(npg_worker_options(m->worker), "sensor");
+    *found = (npg_viewpoints){0};
+    bool is_known = npg_worker_facts(m->worker)->sensor_count_max || !strcmp(sensor, "none");
+    if (is_known || !p->normals || !(m->invented_share > 0)) return NPG_OK;
+    return npg_viewpoints_find(found, m->mesh, p->points, p->normals, p->count, NPG_SAMPLED * p->spacing);
+}
+
+/* What explains why surface has no points is a sensor: of a frame that has none, around the middle of its own points.  So
+ * tracking, carving and the verdict all know what can't be seen. */
+static npg_status give_viewpoints(const npg_facts *facts, npg_frame *frame)
+{
+    const npg_viewpoints *found = &facts->viewpoints;
+    if (!found->count || !found->explain_bare || frame->sensor_count || frame->is_skipped ||
+        !frame->point_count)
+        return NPG_OK;
+    NPG_TRY(npg_alloc_array(&frame->sensor_local, NPG_FOR_FRAMES, found->count, 3 * sizeof(float)));
+    frame->sensor_count = found->count;
+    npg_viewpoints_place(frame->sensor_local, found, frame->pos_local, frame->point_count);
+    return NPG_OK;
+}
+
 /* ---- the best side so far ---- */
 
 static npg_mesh **best_side(const npg_worker *worker)
@@ -443,6 +472,7 @@ static npg_status make_reference(npg_worker *worker, const npg_frame *key, npg_f
     if (!status && !takes_back)
         status = judge_invented(&m); /* what is taken back has its marks and colours */
     if (!status && !takes_back) status = colour_reference(&m);
+    if (!status && !fused) status = find_viewpoints(&m);
     npg_mesh_note(worker, "seconds", npg_clock_s() - since);
     npg_point_set_close(&m.set);
     if (!status) {
@@ -495,6 +525,8 @@ static npg_status mesh_process(npg_worker *worker, npg_chunk **chunk)
     }
     if (!is_there && pass != NPG_PASS_CHOOSE)
         return npg_error(NPG_FAILED, "the keyframe does not come first");
+    for (size_t i = 0; i < npg_chunk_count(*chunk) && pass != NPG_PASS_CHOOSE; i++)
+        NPG_TRY(give_viewpoints(facts, npg_chunk_frame(*chunk, i)));
     return NPG_OK;
 }
 

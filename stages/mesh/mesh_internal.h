@@ -32,7 +32,6 @@ typedef struct npg_point_set {
     bool has_given_normals; /* the capture's own; false: estimated from the points       */
     size_t given;           /* points there were, before any was left out                 */
     bool is_fused;          /* of all frames; false: of the keyframe alone                */
-    bool sees_hidden;       /* npg_viewpoints: what has no point is no surface */
     int64_t key_number;     /* the keyframe's, for the log                                */
     double spacing;         /* npg_cloud_spacing()                                        */
     double diagonal;        /* of the points' box                                         */

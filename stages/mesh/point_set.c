@@ -47,7 +47,6 @@ static npg_status take_fused(npg_point_set *set, npg_worker *worker, npg_fused *
     set->key_spacing = fused->key_spacing_unit;
     set->key_noise = fused->key_noise_unit;
     fused->points = fused->normals = NULL;
-    set->sees_hidden = fused->sees_hidden;
     if (!fused->empty) return NPG_OK;
     NPG_TRY(npg_cube_set_open(&set->empty, fused->empty, fused->empty_count, fused->empty_side));
     if (!npg_worker_facts(worker)->brief.is_side) return NPG_OK;

@@ -103,7 +103,8 @@ static npg_status trim_expected(reconstruction *r)
 {
     const npg_point_set *p = r->set;
     double share;
-    if (!p->sees_hidden || r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
+    bool is_expected = p->is_fused && npg_worker_facts(r->worker)->viewpoints.sees_hidden;
+    if (!is_expected || r->settings->unseen != NPG_UNSEEN_AUTO) return NPG_OK;
     NPG_TRY(npg_mesh_trim(&r->mesh, &share, p->points, p->count, p->seen_dist));
     npg_mesh_note(r->worker, "would_be_seen_share", share);
     if (share > NPG_FEW)
@@ -123,6 +124,7 @@ static npg_status judge_unseen(reconstruction *r)
     int way = r->settings->unseen;
     double share, side = facts->brief.was_open ? UNSEEN_IS_LEFT : UNSEEN_IS_A_SIDE;
     NPG_TRY(npg_mesh_unseen(&share, r->mesh, p->points, p->count, p->seen_dist));
+    bool is_a_side = share > UNSEEN_IS_A_SIDE && !facts->sensor_count_max;
     r->trims_unseen =
         way == NPG_UNSEEN_TRIM || facts->brief.leaves_open || (way != NPG_UNSEEN_KEEP && share > side);
     npg_mesh_note(r->worker, "unseen_share", share);
@@ -130,11 +132,12 @@ static npg_status judge_unseen(reconstruction *r)
                         json_string(r->trims_unseen ? "trimmed" : "kept"));
     if (share > NPG_FEW)
         npg_mesh_warn(r->worker, false, p->key_number,
-                      "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s",
+                      "%.1f %% of the reconstructed surface has no point near it: unseen in %s, %s%s",
                       100 * share, p->is_fused ? "all frames" : "the keyframe",
                       r->trims_unseen          ? "trimmed off"
                       : way == NPG_UNSEEN_KEEP ? "kept as Poisson closed it"
-                                               : "closed tightly");
+                                               : "closed tightly",
+                      is_a_side ? ". If one sensor saw it, say where it stood (option sensor)" : "");
     return NPG_OK;
 }
 

@@ -27,7 +27,6 @@ typedef struct npg_fused {
      * where there are none. */
     float *empty; /* K x 3, owned, or NULL */
     size_t empty_count;
-    bool sees_hidden; /* npg_viewpoints of the keyframe */
     double empty_side;
 } npg_fused;
 

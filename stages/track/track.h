@@ -140,14 +140,6 @@ npg_status npg_visible_find(npg_visible *visible, uint8_t *is_seen, const npg_su
  * of those that add more than NPG_FEW of the points: what a sensor sees has some.  Not the sensors' own places, but
  * what looks where they do: what is seen from C and has no points is not there.  Not in the paper. */
 
-#define NPG_VIEWPOINTS_MOST 64 /* a bit for each */
-
-typedef struct npg_viewpoints {
-    size_t count;                               /* 0 where points are hidden                        */
-    double directions[3 * NPG_VIEWPOINTS_MOST]; /* unit vectors, from the cloud's middle            */
-    bool sees_hidden; /* more than NPG_FEW of the points are seen from nowhere: no sensor's, and all over */
-} npg_viewpoints;
-
 /* mesh: a surface through the points (N x 3, N >= 1, with outward unit normals), in the same pose and coordinates,
  * with its normals and what is unseen of it (nothing where either is NULL); offset: what is nearer than that hides
  * nothing.  Up to 4000 points are asked.  Equal input gives equal bits.  NPG_MEMORY. */

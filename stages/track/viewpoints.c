@@ -51,17 +51,17 @@ static npg_status find_views(search *s, double offset)
     return NPG_OK;
 }
 
-/* Of the places first..end-1 those that the k-th sees and none of the chosen. */
-static double gain(const search *s, uint64_t chosen, size_t k, size_t first, size_t end)
+/* Of the places first..end-1 those that one of `which` sees and none of the chosen. */
+static double gain(const search *s, uint64_t chosen, uint64_t which, size_t first, size_t end)
 {
     double count = 0;
-    for (size_t i = first; i < end; i++) count += !(s->views[i] & chosen) && (s->views[i] >> k & 1);
+    for (size_t i = first; i < end; i++) count += !(s->views[i] & chosen) && (s->views[i] & which);
     return count;
 }
 
 static void choose(search *s)
 {
-    double few = NPG_FEW * (double)s->point_count;
+    double few = NPG_FEW * (double)s->point_count, bare = (double)(s->count - s->point_count);
     uint64_t chosen = 0;
     size_t hidden = 0, best = 0;
     for (size_t i = 0; i < s->point_count; i++) hidden += !s->views[i];
@@ -69,15 +69,17 @@ static void choose(search *s)
     while (!s->found->sees_hidden) {
         double most = -HUGE_VAL;
         for (size_t k = 0; k < s->all.count; k++) {
-            double gained = gain(s, chosen, k, 0, s->point_count);
-            double net = gained - s->points_per_vert * gain(s, chosen, k, s->point_count, s->count);
+            uint64_t view = (uint64_t)1 << k;
+            double gained = gain(s, chosen, view, 0, s->point_count);
+            double net = gained - s->points_per_vert * gain(s, chosen, view, s->point_count, s->count);
             if (gained > few && net > most) most = net, best = k;
         }
-        if (!(most > -HUGE_VAL)) return;
+        if (!(most > -HUGE_VAL)) break;
         chosen |= (uint64_t)1 << best;
         memcpy(s->found->directions + 3 * s->found->count++, s->all.directions + 3 * best,
                3 * sizeof *s->all.directions);
     }
+    s->found->explain_bare = gain(s, 0, chosen, s->point_count, s->count) <= NPG_MOST * bare;
 }
 
 npg_status npg_viewpoints_find(npg_viewpoints *found, const npg_mesh *mesh, const float *points,
