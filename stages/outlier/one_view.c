@@ -6,14 +6,15 @@
 
 #include "geometry/geometry.h"
 #include "geometry/limits.h"
+#include "outlier/normals.h"
 #include "pipeline/frame_box.h"
 #include "pipeline/memory.h"
 
 #define VIEW_CELLS_MAX 512 /* per side of the picture */
 /* Of hidden points, by trial: one view has 0.05 at most, clouds of several 0.08 and more. */
 #define HIDDEN_MAX 0.06
-#define POINTS     5000 /* that are drawn, ... */
-#define PLACES     400  /* ... from so many places */
+#define POINTS     5000 /* that are drawn; half as many have normals */
+#define PLACES     400  /* all round */
 
 typedef struct view { /* a pinhole picture toward the middle of the cloud */
     double right[3], up[3], forward[3], sensor[3];
@@ -103,57 +104,20 @@ typedef struct search {
     size_t count;
     npg_bounds bounds;
     float *cells, *counts; /* room for a picture, owned */
-    double best[3];        /* direction from the cloud's middle */
 } search;
 
-static void place_of(double sensor[3], const search *s, const double direction[3])
+static void place_of(double sensor[3], const search *s, const double direction[3], double away)
 {
-    double away = NPG_SENSOR_AWAY * npg_bounds_diagonal(&s->bounds);
+    away *= NPG_SENSOR_AWAY * npg_bounds_diagonal(&s->bounds);
     for (int a = 0; a < 3; a++) sensor[a] = (s->bounds.lo[a] + s->bounds.hi[a]) / 2 + away * direction[a];
 }
 
-/* False for so few points that there is no picture. */
-static bool aim(view *v, const search *s, const double direction[3])
+/* Share that is hidden from there; 1 where there is no picture. */
+static double hidden_from(view *v, const search *s, const double direction[3])
 {
     double sensor[3];
-    place_of(sensor, s, direction);
-    return aim_view(v, &s->bounds, sensor, s->count);
-}
-
-/* Each direction's hidden share in shares (INFINITY: no picture); the best of them becomes s->best.  Returns its
- * share. */
-static double try_places(search *s, double *shares)
-{
-    double least = INFINITY;
-    for (size_t i = 0; i < PLACES; i++) {
-        double direction[3];
-        view v;
-        npg_direction_spread(direction, i, PLACES);
-        shares[i] = INFINITY;
-        if (!aim(&v, s, direction)) continue;
-        shares[i] = hidden_share(&v, s->cells, s->points, s->count);
-        if (shares[i] >= least) continue;
-        least = shares[i];
-        memcpy(s->best, direction, sizeof s->best);
-    }
-    return least;
-}
-
-/* The mean line of the places from which the cloud looks like one view, both sides of the cloud alike. */
-static void take_mean(search *s, const double *shares)
-{
-    for (int round = 0; round < NPG_ROUNDS_MOST; round++) {
-        double mean[3] = {0};
-        for (size_t i = 0; i < PLACES; i++) {
-            double direction[3], weight = HIDDEN_MAX - shares[i];
-            if (!(weight > 0)) continue;
-            npg_direction_spread(direction, i, PLACES);
-            if (npg_vec3_dot(direction, s->best) < 0) weight = -weight;
-            for (int a = 0; a < 3; a++) mean[a] += weight * direction[a];
-        }
-        npg_vec3_make_unit(mean);
-        for (int a = 0; a < 3; a++) s->best[a] = mean[a];
-    }
+    place_of(sensor, s, direction, 1);
+    return aim_view(v, &s->bounds, sensor, s->count) ? hidden_share(v, s->cells, s->points, s->count) : 1;
 }
 
 /* Mean depth of each cell, NAN where there is no point. */
@@ -191,50 +155,92 @@ static void count_outline(const view *v, search *s, size_t *farther, size_t *nea
     }
 }
 
-/* Turn s->best to the side that the cloud bulges to; false where the outline does not tell: a lead that chance gives, too. */
-static bool choose_side(search *s)
+/* A body that is broad and flat has most of its normals across, wherever it is seen from; where that hides some of it, the
+ * mean of the directions around from which less is hidden is nearer. */
+static void look_around(double direction[3], search *s)
 {
-    size_t farther = 0, nearer = 0;
-    double other[3] = {-s->best[0], -s->best[1], -s->best[2]};
+    double mean[3] = {0}, around[3];
     view v;
-    if (aim(&v, s, s->best)) count_outline(&v, s, &farther, &nearer);
-    if (aim(&v, s, other)) count_outline(&v, s, &nearer, &farther);
-    if (nearer > farther)
-        for (int a = 0; a < 3; a++) s->best[a] = other[a];
-    return fabs((double)farther - (double)nearer) > NPG_BEYOND * sqrt((double)(farther + nearer));
+    for (size_t i = 0; i < PLACES; i++) {
+        npg_direction_spread(around, i, PLACES);
+        if (npg_vec3_dot(around, direction) < M_SQRT1_2) continue;
+        double weight = fmax(0, HIDDEN_MAX - hidden_from(&v, s, around));
+        for (int a = 0; a < 3; a++) mean[a] += weight * around[a];
+    }
+    npg_vec3_make_unit(mean); /* or it stays 0, which sees nothing */
+    memcpy(direction, mean, sizeof mean);
 }
 
-static bool find_place(search *s)
+/* By how much the cloud bulges toward `direction`, as what is on its outline is farther away, in leads that chance
+ * gives; -HUGE_VAL where it is not one view from there, nor from around: there *direction goes then. */
+static double bulge(search *s, double direction[3])
 {
-    double shares[PLACES];
-    if (!(try_places(s, shares) < HIDDEN_MAX)) return false;
-    take_mean(s, shares);
-    return choose_side(s);
+    size_t farther = 0, nearer = 0;
+    double sensor[3];
+    view v;
+    if (!(hidden_from(&v, s, direction) < HIDDEN_MAX)) look_around(direction, s);
+    if (!(hidden_from(&v, s, direction) < HIDDEN_MAX)) return -HUGE_VAL;
+    count_outline(&v, s, &farther, &nearer);
+    place_of(sensor, s, direction, -1);
+    if (aim_view(&v, &s->bounds, sensor, s->count)) count_outline(&v, s, &nearer, &farther);
+    return ((double)farther - (double)nearer) / sqrt((double)(farther + nearer + 1));
+}
+
+/* Where the normals of one side look in the mean, *length, 0..1; a whole body's cancel out.  Sides that the field leaves
+ * undecided are mended from those that face where it looks so far, for as long as that makes it longer. */
+static npg_status mean_normal(double mean[3], double *length, bool *mended, const search *s, npg_arena *at)
+{
+    float *few = npg_arena_take(at, POINTS / 2, 3 * sizeof *few);
+    float *normals = npg_arena_take(at, POINTS / 2, 3 * sizeof *normals), toward[3];
+    double place[3], longer;
+    NPG_TRY(npg_arena_status(at));
+    size_t flipped, n = npg_points_spread(few, NULL, POINTS / 2, s->points, NULL, s->count);
+    NPG_TRY(npg_normals_make(normals, few, n));
+    for (*mended = false, *length = 0;; *mended = true) {
+        for (int a = 0; a < 3; a++) mean[a] = 0;
+        for (size_t i = 0; i < 3 * n; i++) mean[i % 3] += (double)normals[i] / (double)n;
+        *length += longer = npg_vec3_length(mean) - *length;
+        npg_vec3_make_unit(mean);
+        if ((!*mended && *length > NPG_MAJORITY) || longer < NPG_FEW) return NPG_OK;
+        place_of(place, s, mean, 1);
+        for (int a = 0; a < 3; a++) toward[a] = (float)place[a];
+        npg_normals_face_sensor(normals, &flipped, few, n, toward);
+        NPG_TRY(npg_normals_mend(normals, &flipped, few, n));
+    }
 }
 
 size_t npg_one_view_memory(void)
 {
-    return POINTS * (3 + 2) * sizeof(float);
+    return POINTS * 8 * sizeof(float) + npg_winding_memory(POINTS / 2);
 }
 
-npg_status npg_one_view_find(bool *found, double sensor[3], const float *points, size_t n)
+static npg_status find(bool *found, bool *is_sure, double sensor[3], npg_arena *arena, const float *points,
+                       size_t n)
 {
     search s = {.bounds = npg_bounds_empty()};
-    float *room, *pictures = NULL;
-    *found = false;
-    NPG_TRY(npg_alloc_array(&room, NPG_FOR_FRAMES, POINTS, 3 * sizeof *room));
+    double direction[3], length = 0;
+    bool mended = false;
+    float *drawn = npg_arena_take(arena, POINTS, 3 * sizeof *drawn);
     /* four points a cell (aim_view): never more cells than points */
-    npg_status status = npg_alloc_array(&pictures, NPG_FOR_FRAMES, POINTS, 2 * sizeof *pictures);
-    if (!status) {
-        s.points = room;
-        s.count = npg_points_spread(room, NULL, POINTS, points, NULL, n);
-        npg_bounds_add_points(&s.bounds, room, s.count);
-        s.cells = pictures;
-        s.counts = pictures + POINTS;
-        *found = find_place(&s);
-        if (*found) place_of(sensor, &s, s.best);
-    }
-    npg_release(&room);
-    npg_release(&pictures);
+    s.cells = npg_arena_take(arena, POINTS, sizeof *s.cells);
+    s.counts = npg_arena_take(arena, POINTS, sizeof *s.counts);
+    NPG_TRY(npg_arena_status(arena));
+    s.points = drawn;
+    s.count = npg_points_spread(drawn, NULL, POINTS, points, NULL, n);
+    npg_bounds_add_points(&s.bounds, drawn, s.count);
+    if (s.count) NPG_TRY(mean_normal(direction, &length, &mended, &s, arena));
+    double lead = length > NPG_MAJORITY ? bulge(&s, direction) : -HUGE_VAL;
+    *found = lead > 0;
+    *is_sure = !mended && lead > NPG_BEYOND;
+    if (*found) place_of(sensor, &s, direction, 1);
+    return NPG_OK;
+}
+
+npg_status npg_one_view_find(bool *found, bool *is_sure, double sensor[3], const float *points, size_t n)
+{
+    npg_arena arena = {.purpose = NPG_FOR_FRAMES};
+    *found = *is_sure = false;
+    npg_status status = find(found, is_sure, sensor, &arena, points, n);
+    npg_arena_release(&arena);
     return status;
 }

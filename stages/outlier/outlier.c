@@ -26,7 +26,7 @@ typedef struct outlier_state {
     int64_t point_max;
     double ratio;
     /* what was found so far, over the pass */
-    enum { SENSOR_AUTO, SENSOR_FIND, SENSOR_NONE, SENSOR_GIVEN } sensor_kind;
+    enum { SENSOR_AUTO, SENSOR_NONE, SENSOR_GIVEN } sensor_kind;
     bool has_found_sensor;
     npg_sensors sensors; /* where given */
     npg_cleaning sum;
@@ -60,8 +60,8 @@ static const npg_option outlier_options[] = {
         "line X Y Z for each frame in order, or lines NUMBER X Y Z, one for each sensor. Normals point to a "
         "single one, what lies before the points is empty, and surface that can't be seen from there waits "
         "for frames that see it; none: nothing is known, and every frame has all sides; auto: the origin, "
-        "if the points look like one view from it, else, if the keyframe's surface lacks points, what it can be "
-        "seen from; find: one sensor saw each frame, from a place that is looked for"),
+        "if the points look like one view from it, or a place that is looked for, if those of the first frame do from "
+        "there; else, if the keyframe's surface lacks points, what it can be seen from"),
     {0}};
 /* clang-format on */
 
@@ -69,14 +69,10 @@ static const npg_option outlier_options[] = {
 
 static npg_status parse_sensor(outlier_state *s)
 {
-    s->sensor_kind = SENSOR_AUTO;
-    if (!strcmp(s->sensor_text, "auto")) return NPG_OK;
-    s->sensor_kind = SENSOR_FIND;
-    if (!strcmp(s->sensor_text, "find")) return NPG_OK;
-    s->sensor_kind = SENSOR_NONE;
-    if (!strcmp(s->sensor_text, "none")) return NPG_OK;
-    s->sensor_kind = SENSOR_GIVEN;
-    return npg_sensors_open(&s->sensors, s->sensor_text);
+    s->sensor_kind = !strcmp(s->sensor_text, "auto")  ? SENSOR_AUTO
+                     : strcmp(s->sensor_text, "none") ? SENSOR_GIVEN
+                                                      : SENSOR_NONE;
+    return s->sensor_kind == SENSOR_GIVEN ? npg_sensors_open(&s->sensors, s->sensor_text) : NPG_OK;
 }
 
 static void outlier_uninit(npg_worker *worker)
@@ -250,32 +246,29 @@ static npg_status add_sensor(npg_worker *worker, npg_frame *frame, const double 
     frame->sensor_count = 1;
     for (int a = 0; a < 3; a++) frame->sensor_local[a] = (float)place[a];
     if (!s->has_found_sensor)
-        npg_worker_log(
-            worker, NPG_LOG_INFO, frame->number,
-            "the points look like one view, from about %.3g,%.3g,%.3g: taken for a sensor's (option "
-            "sensor)",
-            place[0] + world[0], place[1] + world[1], place[2] + world[2]);
+        npg_worker_log(worker, NPG_LOG_INFO, frame->number,
+                       "the points look like one view, from about %.3g,%.3g,%.3g: a sensor's (option sensor)",
+                       place[0] + world[0], place[1] + world[1], place[2] + world[2]);
     s->has_found_sensor = true;
     return NPG_OK;
 }
 
 /* A depth camera's points are in its own coordinates, as a rule.  Isolated points are gone by now: they would
- * make any cloud look like one view.  Of clouds in other coordinates only the user knows that one sensor saw
- * them: thin bodies, and those that two sensors see, may look like one view. */
+ * make any cloud look like one view.  In other coordinates all frames have one sensor if the first has beyond doubt. */
 static npg_status look_for_sensor(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     double place[3];
-    bool is_found = false, is_asked = s->sensor_kind == SENSOR_FIND;
-    if (frame->sensor_count || (s->sensor_kind != SENSOR_AUTO && !is_asked)) return NPG_OK;
+    bool is_measured = npg_worker_pass(worker) != NPG_PASS_MEASURE, is_found = false, is_sure;
+    bool is_one = is_measured ? npg_worker_facts(worker)->sensor_count_max == 1 : s->has_found_sensor;
+    if (frame->sensor_count || s->sensor_kind != SENSOR_AUTO) return NPG_OK;
     for (int a = 0; a < 3; a++) place[a] = -npg_worker_facts(worker)->origin.world[a];
-    NPG_TRY(is_asked ? npg_one_view_find(&is_found, place, frame->pos_local, frame->point_count)
-                     : npg_cloud_is_single_view(&is_found, frame->pos_local, frame->point_count, place));
-    if (is_found) return add_sensor(worker, frame, place);
-    if (is_asked && comes_first(worker, frame))
-        npg_worker_warn(worker, false, frame->number,
-                        "there is no place from which the points look like one view (option sensor)");
-    return NPG_OK;
+    NPG_TRY(npg_cloud_is_single_view(&is_found, frame->pos_local, frame->point_count, place));
+    if (!is_found && (is_one || (!is_measured && !s->frames))) {
+        NPG_TRY(npg_one_view_find(&is_found, &is_sure, place, frame->pos_local, frame->point_count));
+        is_found = is_found && (is_sure || is_one);
+    }
+    return is_found ? add_sensor(worker, frame, place) : NPG_OK;
 }
 
 /* As option sensor says; without it those that the frame brings. */
@@ -283,7 +276,6 @@ static npg_status set_sensors(npg_worker *worker, npg_frame *frame)
 {
     const outlier_state *s = npg_worker_state(worker);
     if (frame->is_skipped || s->sensor_kind == SENSOR_AUTO) return NPG_OK;
-    if (s->sensor_kind == SENSOR_FIND && is_done(frame)) return NPG_OK; /* kept with what was found */
     npg_frame_forget_sensors(frame);
     if (s->sensor_kind != SENSOR_GIVEN) return NPG_OK;
     return npg_sensors_set(&s->sensors, frame, &npg_worker_facts(worker)->origin);
@@ -399,8 +391,7 @@ static size_t outlier_memory(const npg_worker *worker, size_t *chunks_held)
     size_t thinned = points < (size_t)s->point_max ? points : (size_t)s->point_max;
     size_t threads = npg_parallel_parts((size_t)npg_worker_settings(worker)->chunk_frames, 1, 0);
     *chunks_held = 1;
-    return 17 * points + 60 * thinned + npg_winding_memory(thinned) +
-           (s->sensor_kind == SENSOR_FIND ? npg_one_view_memory() : 0) +
+    return 17 * points + 60 * thinned + npg_winding_memory(thinned) + npg_one_view_memory() +
            threads * npg_find_isolated_memory(thinned);
 }
 

@@ -40,7 +40,7 @@ setup() {
 }
 
 @test "a sensor whose place nobody says is found" {
-    "$NEUPIG" run body/points -o found --sensor find --log-file found.log "${small[@]}"
+    "$NEUPIG" run body/points -o found --log-file found.log "${small[@]}"
     grep -q "look like one view" found.log
     read -r slide share < <(python3 "$BATS_TEST_DIRNAME/turning_body.py" --slide found 6)
     echo "slide $slide, share $share"

@@ -16,7 +16,7 @@
 #define N             4000
 #define AWAY          3.0 /* of the sensor, from the body's middle */
 #define SIDES         12
-#define WITHIN_COSINE 0.9 /* 25 degrees */
+#define WITHIN_COSINE 0.95 /* 18 degrees */
 
 static float points[3 * N], normals[3 * N];
 
@@ -48,10 +48,10 @@ static void a_sensor_is_found_from_all_sides(void **state)
     shape_random r = {3};
     for (int side = 0; side < SIDES; side++) {
         double sensor[3], place[3], wanted[3], got[3];
-        bool found;
+        bool found, sure;
         shape_limbs(points, normals, N, &r);
         sensor_at(sensor, side);
-        assert_int_equal(npg_one_view_find(&found, place, points, see(sensor)), NPG_OK);
+        assert_int_equal(npg_one_view_find(&found, &sure, place, points, see(sensor)), NPG_OK);
         assert_true(found);
         for (int a = 0; a < 3; a++) {
             double middle = a == 2 ? -0.5 : 0;
@@ -64,12 +64,13 @@ static void a_sensor_is_found_from_all_sides(void **state)
     }
 }
 
-static void expect_none(size_t count)
+static void expect_none(size_t count, bool may_be)
 {
     double place[3];
-    bool found;
-    assert_int_equal(npg_one_view_find(&found, place, points, count), NPG_OK);
-    assert_false(found);
+    bool found, sure;
+    assert_int_equal(npg_one_view_find(&found, &sure, place, points, count), NPG_OK);
+    assert_false(sure);
+    assert_false(found && !may_be);
 }
 
 static void a_whole_body_has_none(void **state)
@@ -77,18 +78,18 @@ static void a_whole_body_has_none(void **state)
     (void)state;
     shape_random r = {5};
     shape_limbs(points, normals, N, &r);
-    expect_none(N);
+    expect_none(N, false);
     for (size_t i = 0; i < 3 * N; i++) points[i] += (float)(0.01 * shape_gauss(&r)); /* nor with noise */
-    expect_none(N);
+    expect_none(N, false);
 }
 
-static void a_flat_sheet_has_none(void **state)
+static void a_flat_sheet_has_none_for_sure(void **state)
 {
     (void)state;
     shape_random r = {7};
     for (size_t i = 0; i < N; i++)
         shape_put(points + 3 * i, shape_uniform(&r), shape_uniform(&r), 0.002 * shape_gauss(&r));
-    expect_none(N);
+    expect_none(N, true);
 }
 
 static void few_points_have_none(void **state)
@@ -96,24 +97,24 @@ static void few_points_have_none(void **state)
     (void)state;
     shape_random r = {9};
     shape_sphere(points, normals, 40, 1, &r);
-    expect_none(40);
-    expect_none(0);
+    expect_none(40, false);
+    expect_none(0, false);
     for (size_t i = 0; i < 3 * N; i++) points[i] = 1; /* nor those in one place */
-    expect_none(N);
+    expect_none(N, false);
 }
 
 static void without_memory_it_says_so(void **state)
 {
     (void)state;
     double sensor[3], place[3];
-    bool found;
+    bool found, sure;
     shape_random r = {11};
     shape_limbs(points, normals, N, &r);
     sensor_at(sensor, 4);
     size_t seen = see(sensor);
     for (uint64_t n = 1; n <= 2; n++) {
         npg_memory_fail_at(n, false);
-        assert_int_equal(npg_one_view_find(&found, place, points, seen), NPG_MEMORY);
+        assert_int_equal(npg_one_view_find(&found, &sure, place, points, seen), NPG_MEMORY);
         assert_false(found);
     }
     npg_memory_fail_at(0, false);
@@ -122,10 +123,8 @@ static void without_memory_it_says_so(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_sensor_is_found_from_all_sides),
-        cmocka_unit_test(a_whole_body_has_none),
-        cmocka_unit_test(a_flat_sheet_has_none),
-        cmocka_unit_test(few_points_have_none),
+        cmocka_unit_test(a_sensor_is_found_from_all_sides), cmocka_unit_test(a_whole_body_has_none),
+        cmocka_unit_test(a_flat_sheet_has_none_for_sure),   cmocka_unit_test(few_points_have_none),
         cmocka_unit_test(without_memory_it_says_so),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
