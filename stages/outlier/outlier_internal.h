@@ -71,8 +71,9 @@ npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t point
 /* A place from which the cloud looks like one view, at a distance of 1.5 times its size, where there is one: where
  * its points' normals (npg_normals_make()) look in the mean, if that is more than half as long as one of them, as
  * those of one side have it (a dancer 0.7, a horse 0.6; before three sensors around them 0.1).  Hardly a point may be
- * hidden from there, and what lies along the outline must be farther away: a body bulges toward its sensor.  Where
- * more is hidden, directions around are asked.  *is_sure: beyond what chance gives, so that it is no sheet, and by the normals as they are made.  Known to about 10 degrees (a dancer 4 to 11, a horse 2 to 16).
+ * hidden from there, else directions around are asked, and what lies along the outline must be farther away: a body
+ * bulges toward its sensor.  *is_sure: beyond what chance gives, so that it is no sheet, and by the normals as they are
+ * made.  Known to about 10 degrees (a dancer 1 to 14, a horse 1 to 16).
  * NPG_MEMORY. */
 npg_status npg_one_view_find(bool *found, bool *is_sure, double sensor[3], const float *points,
                              size_t point_count);
