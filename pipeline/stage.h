@@ -59,12 +59,10 @@ typedef struct npg_choice {
 
 /* From where the keyframe was seen, if nobody says so (track/track.h). */
 typedef struct npg_viewpoints {
-    size_t count;                               /* 0 where points are hidden                        */
-    double directions[3 * NPG_VIEWPOINTS_MOST]; /* unit vectors, from the cloud's middle            */
-    bool
-        sees_hidden; /* more than NPG_FEW of the points are seen from nowhere: no sensor's, and all over       */
-    bool
-        explain_bare; /* most of the surface that has no points can't be seen from them; else there are holes */
+    size_t count;                               /* 0 where points are hidden                              */
+    double directions[3 * NPG_VIEWPOINTS_MOST]; /* unit vectors, from the cloud's middle                  */
+    bool sees_hidden;                           /* more than NPG_FEW of the points no sensor can have seen */
+    bool explain_bare; /* most of what has no points can't be seen from them; else there are holes         */
 } npg_viewpoints;
 
 /* Whether the frame with this index is one of the candidates. */
