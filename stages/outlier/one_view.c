@@ -13,8 +13,8 @@
 #define VIEW_CELLS_MAX 512 /* per side of the picture */
 /* Of hidden points, by trial: one view has 0.05 at most, clouds of several 0.08 and more. */
 #define HIDDEN_MAX 0.06
-#define POINTS     5000 /* that are drawn; half as many have normals */
-#define PLACES     400  /* all round */
+#define POINTS     5000 /* that are drawn; normals, of half as many, cost most of the time */
+#define PLACES     400  /* directions all round: 10 degrees apart */
 
 typedef struct view { /* a pinhole picture toward the middle of the cloud */
     double right[3], up[3], forward[3], sensor[3];
@@ -178,8 +178,9 @@ static double bulge(search *s, double direction[3])
     size_t farther = 0, nearer = 0;
     double sensor[3];
     view v;
-    if (!(hidden_from(&v, s, direction) < HIDDEN_MAX)) look_around(direction, s);
-    if (!(hidden_from(&v, s, direction) < HIDDEN_MAX)) return -HUGE_VAL;
+    bool is_one_view = hidden_from(&v, s, direction) < HIDDEN_MAX;
+    if (!is_one_view) look_around(direction, s);
+    if (!is_one_view && !(hidden_from(&v, s, direction) < HIDDEN_MAX)) return -HUGE_VAL;
     count_outline(&v, s, &farther, &nearer);
     place_of(sensor, s, direction, -1);
     if (aim_view(&v, &s->bounds, sensor, s->count)) count_outline(&v, s, &nearer, &farther);
