@@ -19,6 +19,13 @@ void npg_bounds_add_points(npg_bounds *bounds, const float *points, size_t point
         }
 }
 
+npg_bounds npg_bounds_of(const float *points, size_t point_count)
+{
+    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds_add_points(&bounds, points, point_count);
+    return bounds;
+}
+
 void npg_bounds_add(npg_bounds *bounds, const npg_bounds *other)
 {
     for (int a = 0; a < 3; a++) {

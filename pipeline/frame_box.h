@@ -41,6 +41,7 @@ void npg_origin_offer(npg_origin *origin, const double world[3]);
 
 npg_bounds npg_bounds_empty(void);
 void npg_bounds_add_points(npg_bounds *bounds, const float *points, size_t point_count);
+npg_bounds npg_bounds_of(const float *points, size_t point_count);
 void npg_bounds_add(npg_bounds *bounds, const npg_bounds *other);
 double npg_bounds_diagonal(const npg_bounds *bounds);
 

@@ -96,8 +96,7 @@ static npg_status make_folders(const settings *s)
 static npg_scan capture_of(const settings *s, const npg_mesh *first)
 {
     npg_scan capture = s->scan;
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, first->vert_pos, first->vert_count);
+    npg_bounds bounds = npg_bounds_of(first->vert_pos, first->vert_count);
     capture.diagonal = npg_bounds_diagonal(&bounds);
     for (int k = 0; k < 3; k++) capture.centre[k] = 0.5 * (bounds.lo[k] + bounds.hi[k]);
     return capture;

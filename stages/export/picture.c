@@ -107,8 +107,7 @@ static void colour_vertex(float *colour, const npg_mesh *mesh, size_t v, int kin
 static npg_status open_colours(picture_scene *scene, const npg_mesh *mesh, int kind, const npg_mesh *first)
 {
     const npg_mesh *identity = first && first->vert_count == mesh->vert_count ? first : mesh;
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, identity->vert_pos, identity->vert_count);
+    npg_bounds bounds = npg_bounds_of(identity->vert_pos, identity->vert_count);
     NPG_TRY(npg_alloc_array(&scene->colours, NPG_FOR_MESH, mesh->vert_count, 3 * sizeof(float)));
     for (size_t v = 0; v < mesh->vert_count; v++)
         colour_vertex(scene->colours + 3 * v, mesh, v, kind, identity, &bounds);

@@ -168,7 +168,6 @@ double npg_metrics_drift(const npg_mesh *predicted, const npg_mesh *truth, const
 
 double npg_points_diagonal(const float *points, size_t point_count)
 {
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, points, point_count);
+    npg_bounds bounds = npg_bounds_of(points, point_count);
     return npg_bounds_diagonal(&bounds);
 }

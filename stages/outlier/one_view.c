@@ -87,8 +87,7 @@ npg_status npg_cloud_is_single_view(bool *yes, const float *points, size_t n, co
 {
     view v;
     float *nearest;
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, points, n);
+    npg_bounds bounds = npg_bounds_of(points, n);
     *yes = false;
     if (!aim_view(&v, &bounds, sensor, n)) return NPG_OK;
     NPG_TRY(npg_alloc_array(&nearest, NPG_FOR_FRAMES, v.cells * v.cells, sizeof *nearest));

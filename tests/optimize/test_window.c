@@ -210,8 +210,7 @@ static void way_from_the_first(double way[2])
     npg_window_result result;
     npg_held held[8] = {{{0}, NULL}}, *all[8];
     float solved[2][3 * VERTS];
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, (const float[]){-1, -1, -1, 1, 1, 1}, 2);
+    npg_bounds bounds = npg_bounds_of((const float[]){-1, -1, -1, 1, 1, 1}, 2);
     assert_int_equal(npg_frame_box_set(&facts.box, &facts.origin, &bounds), 0);
     for (int i = 0; i < 8; i++) {
         npg_frame *frame = &held[i].frame;

@@ -80,8 +80,7 @@ static void add_noise(npg_scanned *points, const npg_scan *capture, uint64_t fra
 static void add_outliers(npg_scanned *points, const npg_scan *capture, uint64_t frame)
 {
     npg_random random = npg_random_stream(capture->seed, frame, FOR_OUTLIERS);
-    npg_bounds box = npg_bounds_empty();
-    npg_bounds_add_points(&box, points->pos, points->count);
+    npg_bounds box = npg_bounds_of(points->pos, points->count);
     size_t count = (size_t)llround(0.01 * capture->outliers * (double)points->count);
     for (size_t i = 0; i < count; i++) {
         size_t at = (size_t)npg_random_below(&random, points->count);

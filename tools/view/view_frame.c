@@ -30,8 +30,7 @@ static npg_view_grid grid_of(const npg_bounds *all, double shortest)
 
 static npg_view_grid grid_of_one(const float *points, size_t count)
 {
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, points, count);
+    npg_bounds bounds = npg_bounds_of(points, count);
     return grid_of(&bounds, npg_bounds_longest(&bounds));
 }
 

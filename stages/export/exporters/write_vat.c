@@ -197,8 +197,7 @@ static npg_status write_glb(vat_state *s, const npg_corner_split *split, const a
         add_view(root, &end, verts, attributes[i].shape, false, 4 * attributes[i].width);
     }
     json_t *positions = json_array_get(json_object_get(root, "accessors"), 1);
-    npg_bounds box = npg_bounds_empty();
-    npg_bounds_add_points(&box, attributes[0].values, split->count);
+    npg_bounds box = npg_bounds_of(attributes[0].values, split->count);
     json_object_set_new(positions, "min", json_pack("[fff]", box.lo[0], box.lo[1], box.lo[2]));
     json_object_set_new(positions, "max", json_pack("[fff]", box.hi[0], box.hi[1], box.hi[2]));
     json_object_set_new(root, "buffers", json_pack("[{sI}]", "byteLength", end));
