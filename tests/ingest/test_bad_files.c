@@ -227,6 +227,10 @@ static void files_that_can_not_be_opened(void **state)
 
 /* ---- meshes ---- */
 
+#define TRIANGLE(face)                                                                                       \
+    PLY("element vertex 3\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"                  \
+        "end_header\n0 0 0\n1 0 0\n0 1 0\n" face "\n")
+
 static const struct bad_file bad_meshes[] = {
     {"m.ply", BYTES(PLY("element vertex 1\n" XYZ "end_header\n1 2 3\n")), "no faces, so it is not a mesh"},
     {"m.ply",
@@ -235,26 +239,11 @@ static const struct bad_file bad_meshes[] = {
      "no faces, so it is not a mesh"},
     {"m.ply", BYTES(PLY("element vertex 1\n" XYZ "element face 1\nproperty int n\nend_header\n1 2 3\n3\n")),
      "has no list vertex_indices"},
-    {"m.ply",
-     BYTES(PLY("element vertex 3\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"
-               "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n")),
-     "face 0 uses vertex 3, but there are only 3"},
-    {"m.ply",
-     BYTES(PLY("element vertex 3\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"
-               "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n")),
-     "face 0 uses vertex -1"},
-    {"m.ply",
-     BYTES(PLY("element vertex 3\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"
-               "end_header\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n")),
-     "face 0 has 2 corners"},
-    {"m.ply",
-     BYTES(PLY("element vertex 3\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"
-               "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n")),
-     "line 13: the row of element \"face\" ends early"},
-    {"m.ply",
-     BYTES(PLY("element vertex 3\n" XYZ "element face 1\nproperty list uchar int vertex_indices\n"
-               "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 9\n")),
-     "line 13: more values"},
+    {"m.ply", BYTES(TRIANGLE("3 0 1 3")), "face 0 uses vertex 3, but there are only 3"},
+    {"m.ply", BYTES(TRIANGLE("3 0 1 -1")), "face 0 uses vertex -1"},
+    {"m.ply", BYTES(TRIANGLE("2 0 1")), "face 0 has 2 corners"},
+    {"m.ply", BYTES(TRIANGLE("3 0 1")), "line 13: the row of element \"face\" ends early"},
+    {"m.ply", BYTES(TRIANGLE("3 0 1 2 9")), "line 13: more values"},
     {"m.ply",
      BYTES(LE "element vertex 1\n" XYZ "element face 1\nproperty list uint int vertex_indices\n"
               "end_header\n000011112222\xff\xff\xff\xff"),

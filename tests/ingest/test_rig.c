@@ -341,6 +341,7 @@ static void layouts_without_a_rig_name_the_script(void **state)
 #define WITH_POSE(p)    RIG("{" DEPTH ", " CAMERA ", \"pose\": [" p "]}")
 #define WITH(member)    RIG("{" DEPTH ", " CAMERA ", " member "}")
 #define OTHER_CAMERA(c) RIG("{" DEPTH ", \"camera\": {" c "}}")
+#define SIZED(c)        OTHER_CAMERA("\"width\": 40, \"height\": 30, " c)
 
 static const struct {
     const char *text, *message;
@@ -373,21 +374,17 @@ static const struct {
     {WITH_POSE("[1,0,0,0], [0,1,0,0], [0,0,1,0], [0,0,0,1,1]"), "has more numbers"},
     {WITH_POSE("1,0,0,0, 0,1,0,0, 0,0,2,0, 0,0,0,1"), "sensors[0].pose: the pose is no rotation"},
     {WITH_POSE("1,0,0,0, 0,1,0,0, 0,0,-1,0, 0,0,0,1"), "a mirror"},
-    {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 50, \"fy\": 50, \"cx\": 20"),
-     "camera.cy: is missing"},
+    {SIZED("\"fx\": 50, \"fy\": 50, \"cx\": 20"), "camera.cy: is missing"},
     {OTHER_CAMERA("\"width\": 40.5, \"height\": 30, \"fx\": 50, \"fy\": 50, \"cx\": 20, \"cy\": 15"),
      "whole numbers of pixels"},
-    {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 0, \"fy\": 50, \"cx\": 20, \"cy\": 15"),
-     "fx 0 and fy 50 are no focal lengths"},
-    {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 50, \"fy\": 1e-30, \"cx\": 20, \"cy\": 15"),
-     "fx 50 and fy 1e-30 are no focal lengths"},
+    {SIZED("\"fx\": 0, \"fy\": 50, \"cx\": 20, \"cy\": 15"), "fx 0 and fy 50 are no focal lengths"},
+    {SIZED("\"fx\": 50, \"fy\": 1e-30, \"cx\": 20, \"cy\": 15"), "fx 50 and fy 1e-30 are no focal lengths"},
     {WITH("\"near\": 2, \"far\": 1"), "sensors[0].near: must be less than far"},
     {RIG("{\"name\": \"one\", " DEPTH ", " CAMERA "}, " GOOD),
      "sensors[1].depth: its images are those of sensor one"},
-    {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 50, \"fy\": 50, \"cx\": 900, \"cy\": 15"),
-     "far outside"},
-    {OTHER_CAMERA("\"width\": 40, \"height\": 30, \"fx\": 50, \"fy\": 50, \"cx\": 20, \"cy\": 15, "
-                  "\"distortion\": [1, 2, 3]"),
+    {SIZED("\"fx\": 50, \"fy\": 50, \"cx\": 900, \"cy\": 15"), "far outside"},
+    {SIZED("\"fx\": 50, \"fy\": 50, \"cx\": 20, \"cy\": 15, "
+           "\"distortion\": [1, 2, 3]"),
      "4, 5 or 8 numbers"},
     {OTHER_CAMERA("\"width\": 80, \"height\": 60, \"fx\": 50, \"fy\": 50, \"cx\": 20, \"cy\": 15"),
      "d_0000.png: 40 x 30 pixels, but the camera's intrinsics are of 80 x 60"},

@@ -177,6 +177,18 @@ static const npg_stage idle = {.name = "idle", .help = "", .passes = NPG_PASS_SO
 static const npg_stage *const broken_chain[] = {&test_source, &needy, NULL};
 static const npg_stage *const idle_chain[] = {&test_source, &idle, NULL};
 
+static npg_run *open_any(const npg_stage *const *chain, const npg_hooks *hooks)
+{
+    npg_options *options;
+    npg_run *run;
+    assert_int_equal(npg_options_open_chain(&options, chain), NPG_OK);
+    npg_options_set(options, "input", "any");
+    npg_options_set(options, "output", "any");
+    assert_int_equal(npg_run_open_chain(&run, options, hooks, chain), NPG_OK);
+    npg_options_close(&options);
+    return run;
+}
+
 static void misuse_is_refused(void **state)
 {
     char text[1024];
@@ -195,17 +207,12 @@ static void misuse_is_refused(void **state)
     npg_run_close(NULL);
     npg_run_close(&run);
     npg_run_stop(NULL);
-    npg_options *options;
-    assert_int_equal(npg_options_open_chain(&options, probe_chain), NPG_OK);
-    npg_options_set(options, "input", "any");
-    npg_options_set(options, "output", "any");
-    assert_int_equal(npg_run_open_chain(&run, options, NULL, probe_chain), NPG_OK);
+    run = open_any(probe_chain, NULL);
     assert_int_equal(npg_run_push(run, &cloud), NPG_USAGE);
     assert_int_equal(npg_run_finish(run), NPG_USAGE);
     assert_int_equal(npg_run_pull(run, &result), NPG_USAGE);
     npg_run_close(&run);
     assert_null(run);
-    npg_options_close(&options);
 }
 
 /* ---- pushed frames, pulled results ---- */
@@ -363,18 +370,12 @@ static void stop_is_seen_between_chunks(void **state)
     (void)state;
     script.frame_count = INT64_C(1) << 40; /* would never end by itself */
     for (int i = 0; i < 10; i++) {
-        npg_options *options;
-        npg_run *run;
-        assert_int_equal(npg_options_open_chain(&options, probe_chain), NPG_OK);
-        npg_options_set(options, "input", "any");
-        npg_options_set(options, "output", "any");
-        assert_int_equal(npg_run_open_chain(&run, options, NULL, probe_chain), NPG_OK);
+        npg_run *run = open_any(probe_chain, NULL);
         while (atomic_load(&probes[2].frames) < 100 * (i + 1)) sched_yield();
         npg_run_stop(run);
         assert_int_equal(npg_run_wait(run), NPG_STOPPED);
         assert_int_equal(npg_status_exit_code(NPG_STOPPED), 75);
         npg_run_close(&run);
-        npg_options_close(&options);
     }
 }
 
@@ -509,16 +510,10 @@ static void hooks_hear_the_stages(void **state)
     (void)state;
     heard h = {0};
     npg_hooks hooks = {sizeof hooks, &h, hear_log, hear_progress};
-    npg_options *options;
-    npg_run *run;
     script.see = speak;
-    assert_int_equal(npg_options_open_chain(&options, probe_chain), NPG_OK);
-    npg_options_set(options, "input", "any");
-    npg_options_set(options, "output", "any");
-    assert_int_equal(npg_run_open_chain(&run, options, &hooks, probe_chain), NPG_OK);
+    npg_run *run = open_any(probe_chain, &hooks);
     assert_int_equal(npg_run_wait(run), NPG_OK);
     npg_run_close(&run);
-    npg_options_close(&options);
     assert_int_equal(h.progresses, 1);
     assert_true(h.logs >= 2); /* the memory formula, and the frame */
     assert_string_equal(h.last, "sink:frame 0");
@@ -586,17 +581,11 @@ static void the_share_counts_stages_by_what_they_expect(void **state)
     const double shares[] = {0.25, 0.625, 0.625};
     timed t = {.count = 0};
     npg_hooks hooks = {sizeof hooks, &t, NULL, hear_time};
-    npg_options *options;
-    npg_run *run;
     script.frame_count = 1;
     script.make = measure_one;
-    assert_int_equal(npg_options_open_chain(&options, timed_chain), NPG_OK);
-    npg_options_set(options, "input", "any");
-    npg_options_set(options, "output", "any");
-    assert_int_equal(npg_run_open_chain(&run, options, &hooks, timed_chain), NPG_OK);
+    npg_run *run = open_any(timed_chain, &hooks);
     assert_int_equal(npg_run_wait(run), NPG_OK);
     npg_run_close(&run);
-    npg_options_close(&options);
     assert_int_equal(t.count, 3);
     for (size_t i = 0; i < 3; i++) {
         assert_float_equal(t.shares[i], shares[i], 1e-9);

@@ -17,6 +17,13 @@ static npg_brief next(npg_reference_loop *loop, int64_t unreached, bool has_chan
     return npg_reference_next(loop, &result);
 }
 
+static npg_reference_loop begun(int64_t rounds, size_t attempts)
+{
+    npg_reference_loop loop;
+    npg_reference_begin(&loop, rounds, attempts);
+    return loop;
+}
+
 /* The same of a reference that is one side of the body. */
 static npg_brief next_side(npg_reference_loop *loop, int64_t unreached)
 {
@@ -59,8 +66,7 @@ static void what_a_reference_explains_is_gathered_alone(void **state)
 static void too_few_explained_frames_are_no_reference(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 2);
+    npg_reference_loop loop = begun(1, 2);
     const npg_pass_result result = {.has_changed = true, .explained_from = 5, .explained_to = 6};
     npg_brief brief = npg_reference_next(&loop, &result);
     assert_false(brief.takes_gathered);
@@ -91,8 +97,7 @@ static void a_side_grows_until_all_is_reached_and_is_gathered_once_more(void **s
 static void a_side_that_reaches_all_is_gathered_whatever_it_lacks(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 2);
+    npg_reference_loop loop = begun(1, 2);
     npg_brief brief = next_side(&loop, 0);
     assert_true(brief.takes_gathered);
     assert_int_equal(brief.rounds_left, 1); /* what was past its border was not followed */
@@ -104,9 +109,8 @@ static void a_side_that_reaches_all_is_gathered_whatever_it_lacks(void **state)
 static void a_side_before_cameras_is_looked_at_once_more_and_trimmed(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
+    npg_reference_loop loop = begun(1, 2);
     const npg_pass_result side = {.is_side = true, .has_images = true};
-    npg_reference_begin(&loop, 1, 2);
     npg_brief brief = npg_reference_next(&loop, &side);
     assert_int_equal(brief.rounds_left, 1); /* what was past its border was not followed */
     assert_false(brief.trims_only);
@@ -133,8 +137,7 @@ static npg_brief fails(npg_reference_loop *loop, int64_t key, int64_t bad, bool 
 static void a_side_grows_for_as_long_as_fewer_frames_fail(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 0);
+    npg_reference_loop loop = begun(1, 0);
     for (int64_t bad = 60; bad > 3; bad -= 10) {
         assert_int_equal(fails(&loop, 5, bad, false).rounds_left, 1);
         assert_true(loop.now.brief.is_best && loop.now.brief.takes_gathered);
@@ -148,8 +151,7 @@ static void a_side_grows_for_as_long_as_fewer_frames_fail(void **state)
 static void a_side_that_has_grown_for_the_worse_is_taken_back(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 0);
+    npg_reference_loop loop = begun(1, 0);
     assert_true(fails(&loop, 5, 60, true).is_best);
     assert_true(fails(&loop, 5, 10, true).is_best);
     npg_brief brief = fails(&loop, 5, 12, true); /* two more are chance */
@@ -210,8 +212,7 @@ static void one_frame_of_a_short_capture_is_a_few(void **state)
 static void growth_that_stands_still_makes_room_for_another_keyframe(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 1);
+    npg_reference_loop loop = begun(1, 1);
     assert_false(fails(&loop, 5, 60, true).is_attempt);
     assert_false(fails(&loop, 5, 40, true).is_attempt); /* it gains */
     npg_brief brief = fails(&loop, 5, 40, true);
@@ -232,8 +233,7 @@ static void growth_that_stands_still_makes_room_for_another_keyframe(void **stat
 static void a_keyframe_is_as_good_as_the_best_that_it_came_to(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 1);
+    npg_reference_loop loop = begun(1, 1);
     fails(&loop, 5, 60, true);
     fails(&loop, 5, 30, true);
     assert_true(fails(&loop, 5, 50, true).is_attempt && !loop.now.brief.is_best);
@@ -257,8 +257,7 @@ static void a_keyframe_is_as_good_as_the_best_that_it_came_to(void **state)
 static void a_keyframe_that_is_behind_is_given_up(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 1);
+    npg_reference_loop loop = begun(1, 1);
     for (int64_t bad = 70; bad > 20; bad -= 20) fails(&loop, 5, bad, true);
     assert_true(fails(&loop, 5, 30, true).is_attempt);
     assert_false(fails(&loop, 3, 90, true).takes_back); /* which may come in a pass ... */
@@ -285,9 +284,8 @@ static void a_keyframe_without_a_side_is_given_up(void **state)
 static void a_whole_body_is_not_trimmed(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
+    npg_reference_loop loop = begun(1, 2);
     const npg_pass_result whole = {.has_images = true};
-    npg_reference_begin(&loop, 1, 2);
     npg_brief brief = npg_reference_next(&loop, &whole);
     assert_int_equal(brief.rounds_left, 0);
     assert_false(brief.trims_only);
@@ -333,8 +331,7 @@ static npg_brief next_of(npg_reference_loop *loop, int64_t key, int64_t bad, int
 static void a_frame_that_fails_is_the_next_keyframe(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 2);
+    npg_reference_loop loop = begun(1, 2);
     npg_brief brief = next_of(&loop, 5, 9, 3);
     assert_true(brief.is_attempt && brief.rounds_left == 1);
     assert_int_equal(brief.key, 3);
@@ -355,8 +352,7 @@ static npg_brief try_of(npg_reference_loop *loop, int64_t key, bool is_beatable)
 static void a_keyframe_that_none_can_beat_is_compared_with_none(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 2);
+    npg_reference_loop loop = begun(1, 2);
     npg_brief brief = try_of(&loop, 5, false);
     assert_false(brief.compares);
     assert_true(brief.takes_gathered && brief.takes_poses);
@@ -366,8 +362,7 @@ static void a_keyframe_that_none_can_beat_is_compared_with_none(void **state)
 static void the_pass_of_a_keyframe_that_stays_counts(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 2);
+    npg_reference_loop loop = begun(1, 2);
     npg_brief brief = try_of(&loop, 5, true);
     assert_true(brief.compares);
     brief = npg_reference_compared(&loop, 5);
@@ -380,8 +375,7 @@ static void a_keyframe_that_is_beaten_is_followed_no_further(void **state)
 {
     (void)state;
     for (int with_pass = 0; with_pass < 2; with_pass++) {
-        npg_reference_loop loop;
-        npg_reference_begin(&loop, 1, 2);
+        npg_reference_loop loop = begun(1, 2);
         npg_brief brief = with_pass ? try_of(&loop, 5, true) : npg_reference_doubt(&loop);
         assert_true(brief.compares);
         brief = npg_reference_compared(&loop, 8);
@@ -397,8 +391,7 @@ static void a_keyframe_that_is_beaten_is_followed_no_further(void **state)
 static void a_keyframe_that_does_no_better_is_taken_back(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 2, 2);
+    npg_reference_loop loop = begun(2, 2);
     next_of(&loop, 5, 4, 3);
     npg_brief brief = next_of(&loop, 3, 9, 7);
     assert_int_equal(brief.key, 7);
@@ -417,8 +410,7 @@ static void a_keyframe_that_does_no_better_is_taken_back(void **state)
 static void no_other_keyframe_is_tried_without_need(void **state)
 {
     (void)state;
-    npg_reference_loop loop;
-    npg_reference_begin(&loop, 1, 2);
+    npg_reference_loop loop = begun(1, 2);
     assert_false(next_of(&loop, 5, 0, -1).is_attempt);
     npg_reference_begin(&loop, 1, 2); /* nor of a side, which fails by what it lacks */
     const npg_pass_result side = {.key = 5, .bad_count = 9, .is_side = true, .next = 3};
