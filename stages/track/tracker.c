@@ -182,8 +182,7 @@ static npg_status open_system(npg_tracker *t)
 
 static double size_of(const npg_mesh *reference)
 {
-    npg_bounds bounds = npg_bounds_empty();
-    npg_bounds_add_points(&bounds, reference->vert_pos, reference->vert_count);
+    npg_bounds bounds = npg_bounds_of(reference->vert_pos, reference->vert_count);
     double longest = npg_bounds_longest(&bounds);
     return longest > 0 ? longest / (2 * NPG_UNIT_EXTENT) : 1;
 }
@@ -251,20 +250,12 @@ static void turn_arm(double arm[3], const double *rotation, const double d[3])
     for (int i = 0; i < 3; i++) arm[i] = npg_vec3_dot(rotation + 3 * i, d);
 }
 
-/* rotation (point - node). */
-static void set_arm(double arm[3], const double *rotation, const float *point, const float *node)
-{
-    double d[3];
-    npg_vec3_between(d, node, point);
-    turn_arm(arm, rotation, d);
-}
-
 /* The term weight * rho'(|d|^2) |x - target|_W^2. */
 static void set_pull(npg_block_term *out, const npg_tracker *t, const pull *p, const double *pose,
                      double weight, double width)
 {
     npg_block_term term = {0};
-    double x[3], dist_sq = 0;
+    double x[3], from[3], dist_sq = 0;
     npg_pose_point(x, t->graph, pose, p->rest, p->nodes, p->weights);
     for (int i = 0; i < 3; i++) {
         term.right[i] = p->target[i] - x[i];
@@ -275,8 +266,8 @@ static void set_pull(npg_block_term *out, const npg_tracker *t, const pull *p, c
         uint32_t node = p->nodes[term.count];
         term.nodes[term.count] = node;
         term.shares[term.count] = (double)p->weights[term.count];
-        set_arm(term.arms[term.count], pose + node * NPG_POSE_SIZE, p->rest,
-                t->graph->node_pos + 3 * (size_t)node);
+        npg_vec3_between(from, t->graph->node_pos + 3 * (size_t)node, p->rest);
+        turn_arm(term.arms[term.count], pose + node * NPG_POSE_SIZE, from);
     }
     memcpy(term.normal, p->normal, sizeof term.normal);
     term.across = weight * (1 - t->along);
@@ -468,40 +459,40 @@ static size_t grains_of(size_t count)
  * |x(s) - x(c)| <= |x(s) - p| + |p - x(c)| <= 2 |x(s) - p|, and hangs on other nodes. */
 static bool is_of_other_part(const npg_tracker *t, size_t i, const npg_surface_hit *hit)
 {
-    const uint32_t *corners = t->mesh->faces + 3 * (size_t)hit->face;
-    double way[3], least = fmax(NPG_CLEARLY * sqrt((double)t->near_sq[i]), t->graph->radius);
-    for (size_t k = 0; k < 3; k++) {
-        way[k] = -(double)t->mesh->vert_pos[3 * (size_t)t->samples[i] + k];
-        for (size_t c = 0; c < 3; c++)
-            way[k] += (double)hit->weights[c] * (double)t->mesh->vert_pos[3 * (size_t)corners[c] + k];
-    }
-    return npg_vec3_dot(way, way) > least * least;
+    double least = fmax(NPG_CLEARLY * sqrt((double)t->near_sq[i]), t->graph->radius);
+    float place[3];
+    npg_hit_blend(place, hit, t->mesh->faces, t->mesh->vert_pos, 3);
+    return npg_vec3_distance(place, t->mesh->vert_pos + 3 * (size_t)t->samples[i]) > least;
+}
+
+/* Which target a point of the cloud is; target_count: none. */
+static size_t target_of(const npg_tracker *t, size_t point, size_t point_count)
+{
+    size_t i = (point * t->target_count + point_count - 1) / point_count;
+    bool is_one = i < t->target_count && npg_spread_index(i, t->target_count, point_count) == point;
+    return is_one ? i : t->target_count;
 }
 
 /* A limb that no point was seen of must not fold onto its neighbour.  Where sensors are known, is_seen tells. */
 static npg_status find_other_parts(const step *s, size_t first, size_t last)
 {
     npg_tracker *t = s->t;
-    float targets[3 * GRAIN];
-    npg_surface_hit hits[GRAIN];
-    uint32_t start_face[GRAIN];
-    size_t which[GRAIN], count = 0;
     for (size_t i = first; i < last; i++) {
-        t->is_other[i] = false;
         double away = sqrt((double)t->near_sq[i]);
+        t->is_other[i] = false;
         if (s->cloud->sensor_count || away <= s->within || away > NPG_BEYOND * s->width) continue;
-        memcpy(targets + 3 * count, s->cloud->points + 3 * (size_t)t->near[i], 3 * sizeof *targets);
-        start_face[count] = t->sample_face[i];
-        which[count++] = i;
+        size_t near = t->near[i], target = target_of(t, near, s->cloud->count);
+        npg_surface_hit hit = t->hits[target % t->target_count];
+        if (target == t->target_count)
+            NPG_TRY(npg_surface_closest_near(t->surface, &hit, s->cloud->points + 3 * near, 1,
+                                             &t->sample_face[i], 1));
+        t->is_other[i] = is_of_other_part(t, i, &hit);
     }
-    if (!count) return NPG_OK;
-    NPG_TRY(npg_surface_closest_near(t->surface, hits, targets, count, start_face, 1));
-    for (size_t k = 0; k < count; k++) t->is_other[which[k]] = is_of_other_part(t, which[k], &hits[k]);
     return NPG_OK;
 }
 
 /* The first part makes the vertices' normals, which no pair asks for. */
-static npg_status find_pairs(void *user, size_t part)
+static npg_status find_targets(void *user, size_t part)
 {
     const step *s = user;
     npg_tracker *t = s->t;
@@ -512,9 +503,16 @@ static npg_status find_pairs(void *user, size_t part)
         return NPG_OK;
     }
     clip(&first, &last, part - 1, 0, t->target_count);
-    NPG_TRY(npg_surface_closest_near(t->surface, t->hits + first, t->targets + 3 * first, last - first,
-                                     s->is_first ? NULL : t->start_face + first, 1));
-    clip(&first, &last, part - 1, t->target_count, t->sample_count);
+    return npg_surface_closest_near(t->surface, t->hits + first, t->targets + 3 * first, last - first,
+                                    s->is_first ? NULL : t->start_face + first, 1);
+}
+
+static npg_status find_samples(void *user, size_t part)
+{
+    const step *s = user;
+    npg_tracker *t = s->t;
+    size_t first, last;
+    clip(&first, &last, part, 0, t->sample_count);
     float *place = t->sample_pos + 3 * first;
     npg_rows_gather(place, t->vert_pos, t->samples + first, last - first);
     for (size_t i = first; i < last; i++)
@@ -562,7 +560,7 @@ static void sum_up_samples(npg_tracked *tracked, const npg_tracker *t)
 static npg_status gather(step *s)
 {
     npg_tracker *t = s->t;
-    size_t pairs = t->target_count + t->sample_count, terms = pairs + 2 * t->prior.pair_count;
+    size_t terms = t->target_count + t->sample_count + 2 * t->prior.pair_count;
     /* Near its end a fit has its parts in place: what still disagrees is a thin part's other side, which must
      * not keep the points of this one, or a given normal that is wrong.  An open surface lacks other sides,
      * whose points must not pull at what it has. */
@@ -571,7 +569,8 @@ static npg_status gather(step *s)
     npg_pose_vertices(t->vert_pos, t->graph, t->rows, t->mesh->vert_pos);
     NPG_TRY(npg_surface_move(t->surface, t->vert_pos));
     for (size_t i = 0; i < t->target_count; i++) t->start_face[i] = t->hits[i].face;
-    NPG_TRY(npg_parallel(find_pairs, s, 1 + grains_of(pairs)));
+    NPG_TRY(npg_parallel(find_targets, s, 1 + grains_of(t->target_count)));
+    NPG_TRY(npg_parallel(find_samples, s, grains_of(t->sample_count)));
     NPG_TRY(npg_visible_find(&t->visible, t->is_seen, t->surface, s->cloud->sensors, s->cloud->sensor_count,
                              t->sample_pos, t->samples, t->vert_normals, t->sample_count,
                              NPG_SEEN_OFFSET * t->size));
