@@ -111,8 +111,7 @@ static npg_status attach_carried(applying *a)
 {
     const npg_mesh *mesh = a->carried;
     npg_applied *found = a->applied;
-    npg_bounds bounds = npg_bounds_of(a->reference->vert_pos, a->reference->vert_count);
-    double diagonal = npg_bounds_diagonal(&bounds);
+    double diagonal = npg_points_diagonal(a->reference->vert_pos, a->reference->vert_count);
     NPG_TRY(npg_error_prefix(
         npg_attach_open(&a->attachment, a->reference, mesh->vert_pos, a->normals, mesh->vert_count), "%s",
         a->s->mesh));
