@@ -482,8 +482,10 @@ static npg_status find_other_parts(const step *s, size_t first, size_t last)
         t->is_other[i] = false;
         if (s->cloud->sensor_count || away <= s->within || away > NPG_BEYOND * s->width) continue;
         size_t near = t->near[i], target = target_of(t, near, s->cloud->count);
-        npg_surface_hit hit = t->hits[target % t->target_count];
-        if (target == t->target_count)
+        npg_surface_hit hit;
+        if (target < t->target_count)
+            hit = t->hits[target];
+        else
             NPG_TRY(npg_surface_closest_near(t->surface, &hit, s->cloud->points + 3 * near, 1,
                                              &t->sample_face[i], 1));
         t->is_other[i] = is_of_other_part(t, i, &hit);
