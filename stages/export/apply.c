@@ -210,12 +210,11 @@ static npg_status begin_formats(applying *a)
 {
     const npg_mesh *mesh = a->carried;
     npg_export_facts *f = &a->facts;
-    npg_bounds bounds = npg_bounds_empty();
+    npg_bounds bounds = npg_bounds_of(mesh->vert_pos, mesh->vert_count);
     bool is_finer = a->s->fps_scale > 1;
     if (!a->choice.chosen[0]) return NPG_OK;
     float *rest = npg_arena_copy(&a->arena, mesh->vert_pos, mesh->vert_count, 3 * sizeof *rest);
     NPG_TRY(npg_arena_status(&a->arena));
-    npg_bounds_add_points(&bounds, mesh->vert_pos, mesh->vert_count);
     for (size_t i = 0; i < 3 * mesh->vert_count; i++)
         rest[i] = (float)((double)rest[i] + a->origin.world[i % 3]);
     f->output = a->s->output;
